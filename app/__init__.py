@@ -1,0 +1,1 @@
+"""The shell: sockets, clocks, threads, database and screens around the functional core in `pipeline`."""

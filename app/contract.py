@@ -1,0 +1,91 @@
+"""What the running service offers to those that serve it outward (REST, feeds, displays); `app.service` keeps it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.settings import Settings
+from pipeline.airport.model import Airport
+from pipeline.picture import Alert, AlertChange, Picture, RunwayState, SensorState, Visibility
+from pipeline.sites import NodeSite, RadarSite
+from pipeline.tables import NodeEvents, TargetReports
+
+
+class UnknownId(KeyError):
+    """No radar, runway, alert, track or node is called so."""
+
+
+class Refused(ValueError):
+    """The command or the data cannot be taken; the message says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Readiness:
+    """What has been reached at start-up: every check by name, ready when all are true."""
+
+    checks: dict[str, bool]
+
+    @property
+    def ready(self) -> bool:
+        """All checks are true."""
+        return all(self.checks.values())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Video:
+    """The newest full turn of one radar. amplitude: (azimuths, ranges) uint8. time: UTC of the newest sweep."""
+
+    site: RadarSite
+    amplitude: NDArray[np.uint8]
+    time: float
+
+
+PictureListener = Callable[[Picture, tuple[AlertChange, ...]], None]
+"""Called in the surface thread for every new picture; must return at once and must not raise."""
+
+
+class Service(Protocol):
+    """All methods may be called from any thread and do not block longer than a picture takes."""
+
+    settings: Settings
+    airport: Airport
+    airport_geojson: dict[str, Any]
+    radars: tuple[RadarSite, ...]
+    nodes: tuple[NodeSite, ...]
+
+    def readiness(self) -> Readiness:
+        """Which of the start-up checks (database, warm-up, picture) are passed."""
+
+    def picture(self) -> Picture | None:
+        """The newest picture; None before the first."""
+
+    def listen(self, listener: PictureListener) -> Callable[[], None]:
+        """Call `listener` with every new picture; returns the function that ends it."""
+
+    def sensors(self) -> tuple[SensorState, ...]:
+        """The health of every sensor, with counters."""
+
+    def video(self, radar: str) -> Video:
+        """The newest turn of a radar. Raises UnknownId, or Refused when it has not been heard yet."""
+
+    def acknowledge(self, alert: int, by: str) -> Alert:
+        """Acknowledge a live alert. Raises UnknownId; Refused when it is cleared."""
+
+    def set_runway(
+        self, runway: str, *, open: bool | None, in_use: str | None, visibility: Visibility | None
+    ) -> RunwayState:
+        """Set a runway's use. in_use: a designator, "" for not in use, None to leave. Raises UnknownId, Refused."""
+
+    def submit_sweeps(self, radar: str, body: bytes) -> dict[str, int]:
+        """Take sweeps in the documented octet form; counts taken and dropped. Raises UnknownId, Refused."""
+
+    def submit_node_events(self, events: NodeEvents) -> None:
+        """Take node events (their `node` is the index in `nodes`). Raises Refused when the queue is full."""
+
+    def submit_target_reports(self, reports: TargetReports) -> None:
+        """Take target reports. Raises Refused when the queue is full."""

@@ -1,0 +1,274 @@
+"""The settings: one TOML file, with AIRSIDE_* environment variables on top; unknown keys are refused by name."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import tomllib
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
+
+ROOT = Path(__file__).resolve().parent.parent
+"""The checkout or the image: where `static`, `migrations` and `app` lie."""
+
+NOT_SETTINGS = frozenset({"AIRSIDE_SETTINGS", "AIRSIDE_REQUIRE_SERVICES"})
+"""Environment variables of this prefix that are not settings."""
+
+
+class SettingsError(ValueError):
+    """The settings cannot be used; the message names the key and, where there is one, the nearest right name."""
+
+
+class Section(BaseModel):
+    """A table of the settings file."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class UdpSettings(Section):
+    """Where a radar's CAT240 datagrams arrive."""
+
+    address: str = Field("0.0.0.0", description="local address to listen on")
+    port: int = Field(8600, ge=0, le=65535, description="UDP port; 0 lets the system choose")
+    group: str | None = Field(None, description="multicast group to join")
+    interface: str = Field("0.0.0.0", description="address of the interface on which the group is joined")
+    edition: Literal["1.2", "1.3"] = Field("1.3", description="edition of CAT240; it is not on the wire")
+    sac: int | None = Field(None, ge=0, le=255, description="take only this system area code")
+    sic: int | None = Field(None, ge=0, le=255, description="take only this system identification code")
+
+
+class RadarSettings(Section):
+    """One radar."""
+
+    id: str = Field(pattern=r"^[A-Za-z0-9_.-]{1,32}$")
+    latitude: float = Field(ge=-90, le=90)
+    longitude: float = Field(ge=-180, le=180)
+    height_m: float = 22.0
+    north_offset_deg: float = 0.0
+    azimuths: int = Field(4096, ge=16, le=65536)
+    ranges: int = Field(1024, ge=16, le=16384)
+    first_range_m: float = Field(0.0, ge=0)
+    range_step_m: float = Field(3.0, gt=0)
+    beamwidth_deg: float = Field(0.18, gt=0)
+    period_s: float = Field(1.0, gt=0)
+    db_per_step: float = Field(0.3125, gt=0)
+    blocks_per_scan: int = Field(32, ge=1, le=4096, description="sweeps are worked on in this many blocks a turn")
+    simulated: bool = False
+    udp: UdpSettings | None = UdpSettings()
+
+
+class NodeSettings(Section):
+    """One geomagnetic node in the pavement."""
+
+    id: str = Field(pattern=r"^[A-Za-z0-9_.-]{1,32}$")
+    latitude: float = Field(ge=-90, le=90)
+    longitude: float = Field(ge=-180, le=180)
+    heading_deg: float = 0.0
+    hold: str | None = None
+    runway: str | None = None
+    accuracy_m: float = Field(2.0, gt=0)
+    simulated: bool = False
+
+
+class PartSettings(BaseModel):
+    """Which method does a stage's work; every further key is a setting of that method."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+
+    name: str
+
+    def settings(self) -> dict[str, Any]:
+        """The keys that belong to the method."""
+        return dict(self.model_extra or {})
+
+
+class PartsSettings(Section):
+    """The methods, one a stage; `airside parts` lists them with their settings."""
+
+    detect: PartSettings = PartSettings(name="hybrid")
+    extract: PartSettings = PartSettings(name="manhattan")
+    associate: PartSettings = PartSettings(name="gnn")
+    filter: PartSettings = PartSettings(name="kalman")
+    lifecycle: PartSettings = PartSettings(name="m_of_n")
+    classify: PartSettings = PartSettings(name="extent_speed")
+    alert: tuple[PartSettings, ...] = (
+        PartSettings(name="runway_occupied"),
+        PartSettings(name="hold_entry"),
+        PartSettings(name="opposite_direction"),
+        PartSettings(name="closed_runway"),
+    )
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _bare_names(cls, value: Any) -> Any:
+        if isinstance(value, str):
+            return {"name": value}
+        if isinstance(value, list | tuple):
+            return [{"name": one} if isinstance(one, str) else one for one in value]
+        return value
+
+
+class RunwaySettings(Section):
+    """How a runway is used at start."""
+
+    id: str
+    open: bool = True
+    in_use: str | None = None
+    visibility: Literal["normal", "low"] = "normal"
+
+
+class FeedSettings(Section):
+    """The live feed."""
+
+    max_clients: int = Field(500, ge=1)
+    max_message_bytes: int = Field(65536, ge=1024)
+    lag_limit_s: float = Field(10.0, gt=0, description="a client further behind than this is closed with 1013")
+    resume_s: float = Field(60.0, ge=0, description="how far back a client may resume")
+    heartbeat_s: float = Field(1.0, gt=0)
+    compress: bool = Field(False, description="permessage-deflate, for clients far away")
+
+
+class LimitsSettings(Section):
+    """Bounds on what comes in and on what is queued."""
+
+    body_bytes: int = Field(8 * 1024 * 1024, ge=1024)
+    node_events_per_request: int = Field(1000, ge=1)
+    blocks_queued: int = Field(64, ge=2)
+    rows_queued: int = Field(4096, ge=16, description="transactions the database writer may be behind")
+
+
+class StorageSettings(Section):
+    """What is kept, and for how long."""
+
+    retention_days: float = Field(30.0, gt=0)
+    point_interval_s: float = Field(1.0, ge=0, description="at most one stored point of a track in this time")
+
+
+class MqttSettings(Section):
+    """Pavement nodes that speak MQTT."""
+
+    url: str | None = None
+    topic: str = "airside/nodes/+/events"
+
+
+class DemoSettings(Section):
+    """The demonstration."""
+
+    traffic: str = "LFPO"
+    incident_every_s: float = Field(90.0, gt=0)
+    first_incident_s: float = Field(45.0, ge=0)
+    seed: int = 1
+    rain: bool = False
+
+
+class Settings(BaseSettings):
+    """All settings. Top-level keys are also environment variables: AIRSIDE_PORT, AIRSIDE_DATABASE_URL, ..."""
+
+    model_config = SettingsConfigDict(
+        env_prefix="AIRSIDE_", env_nested_delimiter="__", extra="forbid", frozen=True, populate_by_name=True
+    )
+
+    mode: Literal["live", "demo", "replay"] = "live"
+    host: str = "127.0.0.1"
+    port: int = Field(8000, ge=0, le=65535)
+    airport: str = Field("LFPO", description="ICAO code of a shipped airport, or the path of an imported GeoJSON file")
+    data_dir: Path = Path("data")
+    database_url: str = Field("", description="empty: SQLite in data_dir; postgresql+psycopg://... for a fleet")
+    bus_url: str = Field(
+        "memory://", description="memory:// or nats://host:port, where pictures and alerts are published"
+    )
+    log_level: Literal["debug", "info", "warning", "error"] = "info"
+    allowed_origins: tuple[str, ...] = Field((), description="further origins that may open the feed and the 3D view")
+    view3d: bool = True
+    radars: tuple[RadarSettings, ...] = ()
+    nodes: tuple[NodeSettings, ...] = ()
+    runways: tuple[RunwaySettings, ...] = ()
+    parts: PartsSettings = PartsSettings()
+    feed: FeedSettings = FeedSettings()
+    limits: LimitsSettings = LimitsSettings()
+    storage: StorageSettings = StorageSettings()
+    mqtt: MqttSettings = MqttSettings()
+    demo: DemoSettings = DemoSettings()
+
+    @property
+    def database(self) -> str:
+        """The database URL, with the embedded default filled in."""
+        return self.database_url or f"sqlite:///{(self.data_dir / 'airside.sqlite3').resolve()}"
+
+    @classmethod
+    def settings_customise_sources(
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,
+        file_secret_settings: PydanticBaseSettingsSource,
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        """The environment goes over the file (the file comes in through init)."""
+        return env_settings, init_settings
+
+
+def load(path: Path | None = None, **overrides: Any) -> Settings:
+    """Read the file (or none), put the environment on top, and `overrides` (from the command line) on top of all.
+
+    Raises SettingsError with one line a fault.
+    """
+    values: dict[str, Any] = {}
+    if path is not None:
+        try:
+            values = tomllib.loads(path.read_text())
+        except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise SettingsError(f"{path}: {error}") from error
+    _refuse_unknown_environment()
+    try:
+        made = Settings(**values)
+        if overrides:
+            made = made.model_copy(update=overrides)
+            made = Settings.model_validate(made.model_dump())
+    except ValidationError as error:
+        raise SettingsError("\n".join(_explain(one, str(path or "environment")) for one in error.errors())) from error
+    return made
+
+
+def _refuse_unknown_environment() -> None:
+    for name in os.environ:
+        if not name.startswith("AIRSIDE_") or name in NOT_SETTINGS:
+            continue
+        key = name.removeprefix("AIRSIDE_").split("__")[0].lower()
+        if key not in Settings.model_fields:
+            known = [f"AIRSIDE_{field.upper()}" for field in Settings.model_fields]
+            raise SettingsError(f"environment: {name} is not a setting{_nearest(name, known)}")
+
+
+def _explain(fault: Any, where: str) -> str:
+    place = ".".join(str(one) for one in fault["loc"])
+    if fault["type"] == "extra_forbidden":
+        return f"{where}: {place} is not a setting{_nearest(str(fault['loc'][-1]), _known_keys(fault['loc'][:-1]))}"
+    return f"{where}: {place}: {fault['msg']}"
+
+
+def _known_keys(loc: tuple[Any, ...]) -> list[str]:
+    model: Any = Settings
+    for step in loc:
+        if isinstance(step, int) or not hasattr(model, "model_fields") or step not in model.model_fields:
+            continue
+        model = _model_in(model.model_fields[step].annotation)
+    return list(getattr(model, "model_fields", {}))
+
+
+def _model_in(annotation: Any) -> Any:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for one in getattr(annotation, "__args__", ()):
+        found = _model_in(one)
+        if found is not None:
+            return found
+    return None
+
+
+def _nearest(word: str, among: list[str]) -> str:
+    close = difflib.get_close_matches(word, among, n=1, cutoff=0.5)
+    return f"; did you mean {close[0]}?" if close else ""

@@ -1,0 +1,1 @@
+"""Compiled routines that more than one part uses."""

@@ -1,0 +1,1 @@
+"""When a track begins, is believed, coasts and ends."""

@@ -1,0 +1,61 @@
+"""The registry of parts: a folder is a verb, a file in it is a method, and its name is what the settings say.
+
+A part is a frozen dataclass: its fields are its settings, its methods are its work. It is found by importing the folder
+and taking the class that the module names in `PART`. To add a method is to add a file.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import pkgutil
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from functools import cache
+from typing import Any
+
+VERBS = ("detect", "extract", "associate", "filter", "lifecycle", "classify", "alert")
+"""The folders of `pipeline` that hold parts."""
+
+
+class PartError(ValueError):
+    """The settings name a part or a setting that does not exist, or give it a wrong value."""
+
+
+@cache
+def available(verb: str) -> dict[str, type[Any]]:
+    """All methods of a verb by name. Raises PartError for a verb that does not exist."""
+    if verb not in VERBS:
+        raise PartError(f"no kind of part is called {verb!r}{_nearest(verb, VERBS)}")
+    package = importlib.import_module(f"pipeline.{verb}")
+    found: dict[str, type[Any]] = {}
+    for module in pkgutil.iter_modules(package.__path__):
+        part = getattr(importlib.import_module(f"pipeline.{verb}.{module.name}"), "PART", None)
+        if part is not None:
+            found[module.name] = part
+    return found
+
+
+def build(verb: str, name: str, settings: Mapping[str, Any] | None = None) -> Any:
+    """The part called `name`, with its settings. Raises PartError, naming the nearest right word."""
+    known = available(verb)
+    if name not in known:
+        raise PartError(f"no {verb} part is called {name!r}{_nearest(name, known)}")
+    kind = known[name]
+    if not is_dataclass(kind):
+        raise PartError(f"{verb} part {name!r} is not a dataclass")
+    allowed = [f.name for f in fields(kind)]
+    given = dict(settings or {})
+    for key in given:
+        if key not in allowed:
+            raise PartError(f"{verb} part {name!r} has no setting {key!r}{_nearest(key, allowed)}")
+    try:
+        return kind(**given)
+    except (TypeError, ValueError) as error:
+        raise PartError(f"{verb} part {name!r}: {error}") from error
+
+
+def _nearest(word: str, among: Any) -> str:
+    close = difflib.get_close_matches(word, list(among), n=1, cutoff=0.4)
+    choices = ", ".join(sorted(among))
+    return f"; did you mean {close[0]!r}?" if close else f"; there are: {choices}"

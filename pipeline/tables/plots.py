@@ -1,0 +1,51 @@
+"""Plots: what the extractor made of the detections, one row a plot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pipeline.tables.schema import Array, Table, column
+
+
+@dataclass(frozen=True, eq=False)
+class Plots(Table):
+    """One row a plot, at the time of its own sweep."""
+
+    time: Array = column("f8", "s", "UTC when the antenna swept the plot's centroid")
+    radar: Array = column("i2", "", "index of the radar in the engine", default=0)
+    scan: Array = column("i8", "", "turn of that radar since start", default=0)
+    east: Array = column("f8", "m", "centroid of the cells, east of the airport's reference point")
+    north: Array = column("f8", "m", "centroid of the cells, north of the airport's reference point")
+    covariance: Array = column("f8", "m^2", "covariance of (east, north)", shape=(2, 2))
+    range: Array = column("f8", "m", "slant range of the centroid from its radar")
+    azimuth: Array = column("f8", "rad", "azimuth of the centroid from its radar, clockwise from true north")
+    range_extent: Array = column("f4", "m", "extent in range")
+    azimuth_extent: Array = column("f4", "rad", "extent in azimuth")
+    length: Array = column("f4", "m", "extent along the long axis of the cells", default=0.0)
+    width: Array = column("f4", "m", "extent across the long axis of the cells", default=0.0)
+    cells: Array = column("i4", "", "number of detected cells")
+    mean_amplitude: Array = column("f4", "step", "mean log amplitude of the cells")
+    peak_amplitude: Array = column("f4", "step", "greatest log amplitude of the cells")
+    bearing: Array = column("f4", "rad", "direction of the long axis, modulo pi; or nan", default=float("nan"))
+    bearing_sd: Array = column("f4", "rad", "standard deviation of bearing, or nan", default=float("nan"))
+    window: Array = column(
+        "i4", "", "first azimuth row, rows (may pass north), first range cell, cells", shape=(4,), default=0
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SectorPlots:
+    """What a radar chain hands on after each block: the plots completed since the block before.
+
+    Rows are absolute: scan * azimuths + row. Every plot whose centroid lies before `closed_to` has now been delivered,
+    so a track predicted between `closed_from` and `closed_to` that finds no plot has been missed by this radar.
+    time: UTC of the newest sweep looked at. degraded: a cap was hit and detections were left out (counted).
+    """
+
+    radar: int
+    scan: int
+    time: float
+    closed_from: int
+    closed_to: int
+    plots: Plots
+    degraded: bool = False

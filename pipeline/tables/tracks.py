@@ -1,0 +1,60 @@
+"""Tracks: what is believed about each target, one row a track."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+
+from pipeline.tables.schema import Array, Table, column
+
+
+class TrackPhase(IntEnum):
+    """Where a track stands in its life."""
+
+    TENTATIVE = 0
+    CONFIRMED = 1
+    COASTING = 2
+
+
+class TargetClass(IntEnum):
+    """What a target is held to be."""
+
+    UNKNOWN = 0
+    AIRCRAFT = 1
+    VEHICLE = 2
+
+
+class Source(IntFlag):
+    """Which kinds of sensor contributed to a track within their last few seconds."""
+
+    NONE = 0
+    RADAR = 1
+    NODE = 2
+    REPORT = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Tracks(Table):
+    """One row a track, each at its own time."""
+
+    id: Array = column("i4", "", "track number, 1 .. 4095, not used again while its last bearer is remembered")
+    time: Array = column("f8", "s", "UTC to which the state belongs")
+    state: Array = column("f8", "m, m/s", "east, north, velocity east, velocity north", shape=(4,))
+    covariance: Array = column("f8", "m, m/s", "covariance of state", shape=(4, 4))
+    phase: Array = column("u1", "", "TrackPhase", default=0)
+    updated: Array = column("f8", "s", "UTC of the last measurement", default=0.0)
+    born: Array = column("f8", "s", "UTC of the first measurement", default=0.0)
+    hits: Array = column("i4", "", "measurements taken so far", default=0)
+    misses: Array = column("i4", "", "looks in a row that should have seen it and did not", default=0)
+    length: Array = column("f4", "m", "smoothed extent along the heading; nan when unknown", default=float("nan"))
+    width: Array = column("f4", "m", "smoothed extent across the heading; nan when unknown", default=float("nan"))
+    heading: Array = column("f4", "rad", "where the nose points; nan when unknown", default=float("nan"))
+    altitude: Array = column("f4", "m", "height above the airport; nan when unknown", default=float("nan"))
+    on_ground: Array = column("?", "", "held to be on the ground", default=True)
+    category: Array = column("u1", "", "TargetClass", default=0)
+    address: Array = column("U6", "", "24-bit address; empty when unknown", default="")
+    callsign: Array = column("U8", "", "flight or vehicle identification; empty when unknown", default="")
+    sources: Array = column("u1", "", "Source flags", default=0)
+    simulated: Array = column("?", "", "rests on simulated input", default=False)
+    zone: Array = column("i4", "", "index of the airport feature it is on, -1 for none", default=-1)
+    runway: Array = column("i2", "", "index of the runway whose strip it is in, -1 for none", default=-1)
