@@ -4,19 +4,48 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+import sys
+from typing import Annotated
 
 import typer
 
 app = typer.Typer(
     name="airside",
-    help="Surveillance of the airport surface: radar video and pavement nodes in, one live picture and alerts out.",
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_show_locals=False,
 )
 
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"airside {version('airside')}")
+        raise typer.Exit
+
+
+@app.callback()
+def airside(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Surveillance of the airport surface: radar video and pavement nodes in, one live picture and alerts out.
+
+    Start with [bold]airside demo[/bold] (Paris-Orly, simulated radar video), then [bold]airside init[/bold] to write a
+    settings file for your own airport and [bold]airside serve[/bold] to run it.
+    """
+
+
 for _module in pkgutil.iter_modules(__path__):
     importlib.import_module(f"app.cli.{_module.name}").register(app)
+
+
+def fail(message: str, code: int = 2) -> typer.Exit:
+    """Say what is wrong on standard error; use as `raise fail(...)`."""
+    print(f"airside: {message}", file=sys.stderr)
+    return typer.Exit(code)
 
 
 def main() -> None:
