@@ -1,0 +1,150 @@
+"""The surface thread: sectors, events, reports and commands in, pictures and alert changes out."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
+from typing import Any
+
+from app.contract import PictureListener
+from app.runtime.queues import Closed, Inbox
+from pipeline.engine import SurfaceEngine
+from pipeline.picture import AlertChange, Picture, SensorState
+from pipeline.tables import NodeEvents, SectorPlots, TargetReports
+
+log = logging.getLogger(__name__)
+
+IDLE_S = 0.25
+"""Without input a picture is made this often, so that ages, coasting and health stay true."""
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """Work on the engine asked for by another thread, answered through a future."""
+
+    work: Callable[[SurfaceEngine], Any]
+    answer: Future[Any]
+
+
+class SurfaceWorker:
+    """Owns the engine: nobody else touches it. Sensors' health comes from `sensors`, called once a picture."""
+
+    def __init__(self, engine: SurfaceEngine, sensors: Callable[[], tuple[SensorState, ...]], limit: int) -> None:
+        self.engine = engine
+        self.inbox: Inbox[SectorPlots | NodeEvents | TargetReports | Command] = Inbox(limit)
+        self.newest: Picture | None = None
+        self.failures = 0
+        self._sensors = sensors
+        self._listeners: list[PictureListener] = []
+        self._listening = threading.Lock()
+        self._thread = threading.Thread(target=self._run, name="surface", daemon=True)
+        self._last_input = time.monotonic()
+        self._time_at_input = 0.0
+        self._pending: list[AlertChange] = []
+
+    def start(self) -> None:
+        """Begin; the engine's time starts at the present so that a silent start has a true clock."""
+        self.engine.advance(time.time())
+        self._time_at_input = self.engine.time
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Work off what waits, then end."""
+        self.inbox.close()
+        if self._thread.is_alive():
+            self._thread.join(10.0)
+
+    @property
+    def alive(self) -> bool:
+        """The thread runs."""
+        return self._thread.is_alive()
+
+    def listen(self, listener: PictureListener) -> Callable[[], None]:
+        """Call `listener` with every picture; returns the function that ends it."""
+        with self._listening:
+            self._listeners.append(listener)
+
+        def end() -> None:
+            with self._listening:
+                if listener in self._listeners:
+                    self._listeners.remove(listener)
+
+        return end
+
+    def ask(self, work: Callable[[SurfaceEngine], Any], timeout: float = 5.0) -> Any:
+        """Do `work` in the surface thread and give its result; its exception is raised here."""
+        answer: Future[Any] = Future()
+        if not self.inbox.offer(Command(work, answer)):
+            raise RuntimeError("the surface thread takes no more work")
+        return answer.result(timeout)
+
+    def record_change(self, change: AlertChange) -> None:
+        """A change made by a command (an acknowledgement): goes out with the next picture. Surface thread only."""
+        self._pending.append(change)
+
+    def _run(self) -> None:
+        while True:
+            try:
+                items = self.inbox.take_all(IDLE_S)
+            except Closed:
+                return
+            for item in items:
+                self._take(item)
+            self._let_time_pass(bool(items))
+            self._look()
+
+    def _take(self, item: SectorPlots | NodeEvents | TargetReports | Command) -> None:
+        try:
+            if isinstance(item, Command):
+                self._answer(item)
+            elif isinstance(item, SectorPlots):
+                self.engine.sector(item)
+            elif isinstance(item, NodeEvents):
+                self.engine.node_events(item)
+            else:
+                self.engine.target_reports(item)
+        except Exception:
+            self.failures += 1
+            log.exception("the surface engine could not take a %s", type(item).__name__)
+
+    def _answer(self, command: Command) -> None:
+        if not command.answer.set_running_or_notify_cancel():
+            return
+        try:
+            command.answer.set_result(command.work(self.engine))
+        except Exception as error:
+            command.answer.set_exception(error)
+
+    def _let_time_pass(self, heard: bool) -> None:
+        now = time.monotonic()
+        if heard and self.engine.time > self._time_at_input:
+            self._last_input, self._time_at_input = now, self.engine.time
+            return
+        if now - self._last_input > 2 * IDLE_S:
+            self.engine.advance(self._time_at_input + now - self._last_input)
+
+    def _look(self) -> None:
+        try:
+            sensors = self._sensors()
+            self.engine.sensors_degraded = any(s.kind == "radar" and s.status != "ok" for s in sensors)
+            picture, changes = self.engine.look()
+        except Exception:
+            self.failures += 1
+            log.exception("no picture could be made")
+            return
+        picture = replace(picture, sensors=sensors)
+        self.newest = picture
+        changes = (*self._pending, *changes)
+        self._pending.clear()
+        with self._listening:
+            listeners = tuple(self._listeners)
+        for listener in listeners:
+            try:
+                listener(picture, changes)
+            except Exception:
+                self.failures += 1
+                log.exception("a listener failed")
