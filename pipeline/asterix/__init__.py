@@ -1,0 +1,1 @@
+"""ASTERIX: the octet formats that surveillance sensors speak."""
