@@ -1,0 +1,1 @@
+"""Ways in: radar video by datagram, octets or recording; node events and target reports by JSON and MQTT."""
