@@ -162,6 +162,7 @@ class DemoSettings(Section):
     first_incident_s: float = Field(45.0, ge=0)
     seed: int = 1
     rain: bool = False
+    udp_port: int = Field(8600, ge=0, le=65535, description="where the simulated radar sends its datagrams")
 
 
 class Settings(BaseSettings):
