@@ -92,8 +92,7 @@ def _time_counts(time_of_day: NDArray[np.float64]) -> NDArray[np.int64]:
     """Seconds since midnight to 1/128 s, -1 for nan."""
     seconds = np.asarray(time_of_day, np.float64)
     known = np.isfinite(seconds)
-    # floor, not round: a time of the evening must not become the next midnight
-    counts = np.floor(np.where(known, seconds, 0.0) % 86400 * TIME_STEPS).astype(np.int64)
+    counts = np.rint(np.where(known, seconds, 0.0) * TIME_STEPS).astype(np.int64) % (86400 * TIME_STEPS)
     return np.where(known, counts, -1)
 
 

@@ -1,0 +1,150 @@
+"""The assembler: radar messages in the order of their arrival in, `Sweeps` blocks on the azimuth grid out.
+
+It asks no clock: the time of arrival comes with each message and serves to find the day of the message's time of day,
+to judge steps of the radar's clock, and as the time of sweeps that carry none. The same messages in the same order
+give the same blocks, however they are cut into batches.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.assemble.fill import FILLED, fill
+from pipeline.assemble.order import COUNTERS, PLACED_FIELDS, SEEN, GridRules, new_state, order
+from pipeline.asterix.cat240_batch import VideoBatch, decode_batch
+from pipeline.sites import RadarSite
+from pipeline.tables import Sweeps
+
+LIGHT_M_PER_S = 299_792_458.0
+
+
+class Assembler:
+    """The state of one radar's assembly.
+
+    site: gives the grid and the offset of north. index: of the radar in the engine. blocks_per_scan: blocks a turn; a
+    block is handed on as soon as its last row is in. sac, sic: take messages of this source only; None takes any.
+
+    Rules: a message covers the grid rows whose centre lies between its start and end azimuth, or the row it lies in
+    when it is finer than the grid (cells of several such messages: the greatest). Parts of one azimuth that follow each
+    other in range are joined; a row that stays short is not handed on. What is not taken is counted by reason, see
+    `pipeline.assemble.order.COUNTERS`.
+    """
+
+    def __init__(
+        self,
+        site: RadarSite,
+        index: int,
+        blocks_per_scan: int = 32,
+        *,
+        sac: int | None = None,
+        sic: int | None = None,
+    ) -> None:
+        video = site.video
+        if not 1 <= blocks_per_scan <= video.azimuths:
+            raise ValueError(f"{blocks_per_scan} blocks do not divide {video.azimuths} azimuths")
+        self.site = site
+        self.index = index
+        self._rules = GridRules(
+            azimuths=video.azimuths,
+            ranges=video.ranges,
+            first_cell=round(video.first_range_m / video.range_step_m),
+            cell_fs=2e15 * video.range_step_m / LIGHT_M_PER_S,
+            offset=round(site.north_offset / (2 * math.pi) * 2**26) % 2**26,
+            period=video.period_s,
+            source_mask=(0 if sac is None else 0xFF00) | (0 if sic is None else 0x00FF),
+            source=(sac or 0) << 8 | (sic or 0),
+        )
+        edges = -(-np.arange(blocks_per_scan + 1) * video.azimuths // blocks_per_scan)
+        self._edges = edges.astype(np.int64)
+        self._order, self._clock = new_state()
+        self._seen = np.full(SEEN, -1, np.int64)
+        self._counts = np.zeros(len(COUNTERS), np.int64)
+        self._decoding: dict[str, int] = {"malformed": 0, "wrong_category": 0, "compressed": 0, "summary": 0}
+        self._block = np.array([-1, -1, 0, 0, 0, 0], np.int64)
+        self._rows = int(np.diff(edges).max())
+        self._new_buffers()
+
+    def push_datagrams(
+        self, datagrams: NDArray[np.uint8], lengths: NDArray[np.int32], arrival: NDArray[np.float64]
+    ) -> list[Sweeps]:
+        """Decode datagrams (n, width) uint8 of `lengths` octets and push what they hold.
+
+        arrival: (n,) float64 UTC seconds. The datagrams may be overwritten afterwards.
+        """
+        blocks: list[Sweeps] = []
+        for batch, origin in decode_batch(datagrams, lengths, self._decoding):
+            blocks += self.push(batch, arrival[origin])
+        return blocks
+
+    def push(self, batch: VideoBatch, arrival: NDArray[np.float64]) -> list[Sweeps]:
+        """Take messages in the order of their arrival; gives the blocks that they complete.
+
+        arrival: (n,) float64 UTC seconds.
+        """
+        n = len(batch)
+        placed = np.empty((n, PLACED_FIELDS), np.int64)
+        times = np.empty((n, 2))
+        order(
+            batch.fields, np.ascontiguousarray(arrival, np.float64), self._rules, self._order, self._clock, self._seen,
+            self._counts, placed, times,
+        )  # fmt: skip
+        blocks: list[Sweeps] = []
+        at, row = 0, -1
+        while True:
+            at, row, full = fill(
+                batch.fields, batch.octets, placed, times, at, row, self._rules.azimuths, self._rules.first_cell,
+                self._edges, self._block, self._amplitude, self._cover, self._key, self._time, self._azimuth,
+                self._counts,
+            )  # fmt: skip
+            if full != FILLED:
+                return blocks
+            block = self._close(next_row=row if at < n else -1)
+            if block is not None:
+                blocks.append(block)
+
+    def flush(self) -> list[Sweeps]:
+        """What is in the open block (zero or one block); for the end of a recording."""
+        block = self._close(next_row=-1) if self._block[0] >= 0 else None
+        return [] if block is None else [block]
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What was taken, and what was not by reason."""
+        return {name: int(count) for name, count in zip(COUNTERS, self._counts, strict=True)} | self._decoding
+
+    def _new_buffers(self) -> None:
+        rows, ranges = self._rows, self._rules.ranges
+        self._amplitude = np.zeros((rows, ranges), np.uint8)
+        self._cover = np.zeros(rows, np.int32)
+        self._key = np.zeros(rows, np.int64)
+        self._time = np.zeros(rows)
+        self._azimuth = np.zeros(rows)
+
+    def _close(self, next_row: int) -> Sweeps | None:
+        start, end, gap = int(self._block[0]), int(self._block[1]), bool(self._block[3])
+        azimuths, ranges = self._rules.azimuths, self._rules.ranges
+        rows = end - start
+        whole = np.flatnonzero(self._cover[:rows] >= ranges)
+        short = int(np.count_nonzero(self._cover[:rows])) - len(whole)
+        self._counts[COUNTERS.index("incomplete" if gap else "wrong_cell_count")] += short
+        self._counts[COUNTERS.index("sweeps")] += len(whole)
+        scan = start // azimuths
+        last = end % azimuths == 0 or (next_row >= 0 and next_row // azimuths != scan)
+        made = None
+        if len(whole):
+            amplitude = self._amplitude[:rows] if len(whole) == rows else self._amplitude[whole]
+            made = Sweeps(
+                radar=self.index,
+                scan=scan,
+                row=(whole + start % azimuths).astype(np.int32),
+                azimuth=self._azimuth[whole],
+                time=self._time[whole],
+                amplitude=amplitude,
+                last=last,
+            )
+        self._block[:] = (-1, -1, max(end, int(self._block[2])), 0, 0, 0)
+        self._new_buffers()
+        return made
