@@ -9,9 +9,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 ALLOWED_IN_THE_CORE = {
-    "__future__", "abc", "collections", "dataclasses", "difflib", "enum", "functools", "heapq", "importlib",
-    "itertools", "math", "pkgutil", "re", "struct", "types", "typing", "bisect", "operator", "zlib", "string", "unicodedata",
-    "numpy", "scipy", "numba", "llvmlite", "filterpy", "shapely", "pyproj", "networkx", "pipeline",
+    "__future__", "abc", "collections", "copy", "dataclasses", "difflib", "enum", "functools", "heapq", "importlib",
+    "itertools", "math", "pkgutil", "re", "struct", "types", "typing", "bisect", "operator", "zlib", "string",
+    "unicodedata", "numpy", "scipy", "numba", "llvmlite", "filterpy", "shapely", "pyproj", "networkx", "pipeline",
 }  # fmt: skip
 NUMERICS = {"scipy", "numba", "filterpy"}
 
