@@ -1,0 +1,1 @@
+"""REST, documents and pages: the running service as HTTP."""

@@ -1,0 +1,104 @@
+"""The web application: all routes, errors as problems, security headers, the live feed, the pages."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+from fastapi import APIRouter, FastAPI, WebSocket
+from starlette.responses import Response
+
+from app.api import models, problems
+from app.api.context import Context, answer
+from app.api.intake import intake_router
+from app.api.metrics import metrics_router
+from app.api.middleware import Guard
+from app.api.pages import pages_router
+from app.api.readsb import readsb_router
+from app.api.surveillance import surveillance_router
+from app.api.video import video_router
+from app.contract import Service
+from app.live.asyncapi import document as asyncapi_document
+from app.live.hub import Hub
+from app.live.session import serve
+from app.wire import Wire
+
+if TYPE_CHECKING:
+    from app.store.store import Store
+
+
+def create_app(service: Service, *, hub: Hub, store: Store | None, view3d_router: APIRouter | None = None) -> FastAPI:
+    """The application over a service that may still be starting. The hub begins and ends with the application."""
+    settings = service.settings
+    context = Context(service, hub, store, settings, Wire(service.airport, settings.mode))
+
+    @asynccontextmanager
+    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        hub.start()
+        try:
+            yield
+        finally:
+            await hub.stop()
+
+    app = FastAPI(
+        title="Airside",
+        summary="Live picture and runway alerts of the airport surface",
+        description=models.__doc__ or "",
+        version=version("airside"),
+        docs_url=None,
+        redoc_url=None,
+        lifespan=lifespan,
+        redirect_slashes=False,
+    )
+    problems.install(app)
+    app.add_middleware(Guard, max_body=settings.limits.body_bytes, allowed_origins=settings.allowed_origins)
+    app.include_router(_operation_router(service))
+    app.include_router(surveillance_router(context))
+    app.include_router(video_router(context))
+    app.include_router(intake_router(context))
+    app.include_router(readsb_router(context))
+    app.include_router(metrics_router(context))
+    app.include_router(_feed_router(context))
+    if view3d_router is not None:
+        app.include_router(view3d_router)
+    app.include_router(pages_router())
+    return app
+
+
+def _operation_router(service: Service) -> APIRouter:
+    router = APIRouter(prefix="/health", tags=["operation"])
+
+    @router.get("/live", response_model=models.Health)
+    async def live() -> Response:
+        """The process answers."""
+        return answer({"status": "ok", "checks": {}})
+
+    @router.get("/ready", response_model=models.Health, responses={503: {"model": models.Health}})
+    def ready() -> Response:
+        """200 after migrations, warm-up and the first picture; 503 with the checks before."""
+        readiness = service.readiness()
+        body = {"status": "ok" if readiness.ready else "starting", "checks": readiness.checks}
+        return answer(body, 200 if readiness.ready else 503)
+
+    return router
+
+
+def _feed_router(context: Context) -> APIRouter:
+    router = APIRouter()
+    made: list[dict[str, Any]] = []
+
+    @router.websocket("/api/v1/live")
+    async def live(websocket: WebSocket) -> None:
+        """The live feed; /asyncapi.json describes it."""
+        await serve(websocket, context.hub)
+
+    @router.get("/asyncapi.json", tags=["operation"])
+    async def asyncapi() -> Response:
+        """The AsyncAPI 3.0 document of the live feed and the bus."""
+        if not made:
+            made.append(asyncapi_document(context.wire.airport.icao, version("airside")))
+        return answer(made[0])
+
+    return router

@@ -1,0 +1,90 @@
+"""What the routes share, and how they answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Annotated, Any
+
+from fastapi import Query
+from pydantic import BeforeValidator, WithJsonSchema
+from starlette.responses import Response
+
+from app.api.models import Problem
+from app.api.problems import PROBLEM, ApiProblem
+from app.contract import Refused, Service
+from app.live.hub import Hub
+from app.settings import Settings
+from app.wire import Row, Wire, encode
+
+if TYPE_CHECKING:
+    from app.store.store import Store
+
+
+@dataclass(frozen=True)
+class Context:
+    """The service and what stands around it. store: None when nothing is kept."""
+
+    service: Service
+    hub: Hub
+    store: Store | None
+    settings: Settings
+    wire: Wire
+
+    def stamp(self) -> Row:
+        """epoch, seq, time and mode of the newest picture. Raises ApiProblem before the first."""
+        picture = self.hub.picture
+        if picture is None:
+            raise ApiProblem(503, "there is no picture yet", headers={"Retry-After": "1"})
+        return {
+            "epoch": self.hub.epoch,
+            "seq": self.hub.picture_seq,
+            "time": picture.time,
+            "mode": self.settings.mode,
+        }
+
+    def ask(self, work: Callable[[], Any], refusal: int = 409) -> Any:
+        """Do `work`; what the service refuses becomes `refusal`, or 503 while it is not ready."""
+        try:
+            return work()
+        except Refused as error:
+            if not self.service.readiness().ready:
+                raise ApiProblem(503, str(error), headers={"Retry-After": "1"}) from error
+            raise ApiProblem(refusal, str(error)) from error
+
+
+def answer(value: Any, status: int = 200) -> Response:
+    """JSON; the only way answers are made."""
+    return Response(encode(value), status, media_type="application/json")
+
+
+def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """The declarations of these errors for OpenAPI."""
+    words = {"model": Problem, "content": {PROBLEM: {}}}
+    return dict.fromkeys(statuses, words)
+
+
+def instant(value: Any) -> float:
+    """Unix seconds of a number or an ISO 8601 time (UTC when no zone is given). Raises ValueError."""
+    if isinstance(value, str):
+        try:
+            number = float(value)
+        except ValueError:
+            text = value.strip().replace(" ", "+")
+            moment = datetime.fromisoformat(text)
+            return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+    else:
+        number = float(value)
+    if not -1e12 < number < 1e12:
+        raise ValueError("seconds out of bounds")
+    return number
+
+
+_TIME_SCHEMA = {
+    "anyOf": [{"type": "number", "minimum": -1e11, "maximum": 1e11}, {"type": "string", "format": "date-time"}],
+    "description": "Unix seconds or ISO 8601",
+}
+Instant = Annotated[float, BeforeValidator(instant), WithJsonSchema(_TIME_SCHEMA)]
+From = Annotated[Instant | None, Query(alias="from", description="not before: Unix seconds or ISO 8601")]
+To = Annotated[Instant | None, Query(description="not after: Unix seconds or ISO 8601")]

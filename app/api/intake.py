@@ -1,0 +1,93 @@
+"""The other ways in: sweeps as octets, node events and target reports as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import msgspec
+from fastapi import APIRouter, Path
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import Response
+
+from app.api import models
+from app.api.context import Context, answer, problems
+from app.api.problems import ApiProblem
+from app.ingest.node_events import NodeEventRow, parse_node_events
+from app.ingest.target_reports import TargetReportRow, parse_target_reports
+
+OCTETS = "application/octet-stream"
+JSON = "application/json"
+
+
+def intake_router(context: Context) -> APIRouter:
+    """POST /api/v1/radars/{id}/sweeps, /nodes/events, /targets/reports."""
+    router = APIRouter(prefix="/api/v1", tags=["ways in"])
+    service, limits = context.service, context.settings.limits
+    failures = problems(403, 404, 409, 413, 415, 422, 503)
+
+    @router.post(
+        "/radars/{id}/sweeps",
+        response_model=models.Counted,
+        responses=failures,
+        openapi_extra={"requestBody": {"required": True, "content": {OCTETS: {"schema": {"type": "string"}}}}},
+    )
+    async def sweeps(id: Annotated[str, Path(max_length=32)], request: Request) -> Response:
+        """Sweeps of a radar as octets: the header and layout are described in `app/ingest/octets.py` and the README."""
+        body = await _body(request, OCTETS)
+        counted = await run_in_threadpool(context.ask, lambda: service.submit_sweeps(id, body), 422)
+        return answer(counted)
+
+    @router.post(
+        "/nodes/events",
+        response_model=models.Counted,
+        responses=failures,
+        openapi_extra=_json_body(NodeEventRow, limits.node_events_per_request),
+    )
+    async def node_events(request: Request) -> Response:
+        """Events of the nodes in the pavement, one object or an array; nothing is taken when one is wrong."""
+        body = await _body(request, JSON)
+        events = _parsed(lambda: parse_node_events(body, service.nodes, limits.node_events_per_request))
+        await run_in_threadpool(context.ask, lambda: service.submit_node_events(events), 503)
+        if context.store is not None:
+            context.store.record_node_events(events)
+        return answer({"taken": len(events)})
+
+    @router.post(
+        "/targets/reports",
+        response_model=models.Counted,
+        responses=failures,
+        openapi_extra=_json_body(TargetReportRow, limits.node_events_per_request),
+    )
+    async def target_reports(request: Request) -> Response:
+        """Positions that cooperative sensors give (ADS-B, multilateration, vehicle beacons)."""
+        body = await _body(request, JSON)
+        frame, limit = service.airport.frame, limits.node_events_per_request
+        reports = _parsed(lambda: parse_target_reports(body, frame, limit))
+        await run_in_threadpool(context.ask, lambda: service.submit_target_reports(reports), 503)
+        return answer({"taken": len(reports)})
+
+    return router
+
+
+async def _body(request: Request, media_type: str) -> bytes:
+    given = request.headers.get("content-type", "").split(";")[0].strip().lower()
+    if given != media_type:
+        raise ApiProblem(415, f"content type {media_type} wanted", headers={"Accept": media_type})
+    return await request.body()
+
+
+def _parsed(work: Callable[[], Any]) -> Any:
+    try:
+        return work()
+    except ValueError as error:
+        raise ApiProblem(422, str(error)) from error
+
+
+def _json_body(row: type[msgspec.Struct], limit: int) -> dict[str, Any]:
+    """The request body for OpenAPI, from the struct that decodes it."""
+    schemas, components = msgspec.json.schema_components([row], ref_template="#/components/schemas/{name}")
+    one = components[row.__name__] if row.__name__ in components else schemas[0]
+    many = {"type": "array", "items": one, "maxItems": limit}
+    return {"requestBody": {"required": True, "content": {JSON: {"schema": {"anyOf": [one, many]}}}}}

@@ -1,0 +1,94 @@
+"""What holds for every request: security headers, the limit on bodies, and no writing from foreign pages."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.api.problems import ApiProblem, problem
+from app.live.session import origin_allowed
+
+STRICT = (
+    "default-src 'self'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
+    "object-src 'none'; base-uri 'self'; form-action 'self'; frame-ancestors 'self'"
+)
+VIEW_3D = (
+    "default-src 'self' 'unsafe-inline' 'unsafe-eval' blob: data:; connect-src 'self' blob: data:; "
+    "worker-src 'self' blob:; object-src 'none'; base-uri 'self'; frame-ancestors 'self'"
+)
+HEADERS = {
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "X-Frame-Options": "SAMEORIGIN",
+    "Cross-Origin-Opener-Policy": "same-origin",
+}
+WRITING = frozenset({"POST", "PUT", "PATCH", "DELETE"})
+
+
+class Guard:
+    """ASGI middleware. max_body: bytes that a request may carry; allowed_origins: further pages that may write."""
+
+    def __init__(self, app: ASGIApp, max_body: int, allowed_origins: tuple[str, ...]) -> None:
+        self.app = app
+        self.max_body = max_body
+        self.allowed_origins = allowed_origins
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass the request on, guarded."""
+        if scope["type"] == "websocket":
+            # The live feed must be able to cut a peer that never reads; ASGI itself has no word for that.
+            scope["airside.protocol"] = getattr(send, "__self__", None)
+            await self.app(scope, receive, send)
+            return
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        headers = Headers(scope=scope)
+        answer = _with_headers(scope["path"], send)
+        refusal = self._refusal(scope, headers)
+        if refusal is not None:
+            await refusal(scope, receive, answer)
+            return
+        await self.app(scope, self._counted(receive), answer)
+
+    def _refusal(self, scope: Scope, headers: Headers) -> Any:
+        length = headers.get("content-length", "0")
+        if length.isdecimal() and int(length) > self.max_body:
+            return problem(413, f"the body may have {self.max_body} bytes", headers={"Connection": "close"})
+        if scope["method"] in WRITING and not origin_allowed(
+            headers.get("origin"), headers.get("host"), self.allowed_origins
+        ):
+            return problem(403, "pages of another origin may not write here")
+        return None
+
+    def _counted(self, receive: Receive) -> Receive:
+        taken = 0
+
+        async def counted() -> Message:
+            nonlocal taken
+            message = await receive()
+            if message["type"] == "http.request":
+                taken += len(message.get("body", b""))
+                if taken > self.max_body:
+                    raise ApiProblem(413, f"the body may have {self.max_body} bytes", headers={"Connection": "close"})
+            return message
+
+        return counted
+
+
+def _with_headers(path: str, send: Send) -> Send:
+    policy = VIEW_3D if path == "/3d" or path.startswith("/3d/") else STRICT
+
+    async def answer(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            for name, value in HEADERS.items():
+                headers.setdefault(name, value)
+            headers.setdefault("Content-Security-Policy", policy)
+            if path.startswith(("/api/", "/data/", "/health/", "/metrics")):
+                headers.setdefault("Cache-Control", "no-store")
+        await send(message)
+
+    return answer

@@ -1,0 +1,1 @@
+"""Storage: one writer thread that owns its connection, readers on their own."""

@@ -1,0 +1,1 @@
+"""Tests of storage, REST, live feed and metrics."""
