@@ -12,8 +12,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.assemble.fill import FILLED, fill
-from pipeline.assemble.order import COUNTERS, PLACED_FIELDS, SEEN, GridRules, new_state, order
+from pipeline.assemble.fill import FILLED, order_and_fill
+from pipeline.assemble.order import COUNTERS, PLACED_FIELDS, SEEN, GridRules, new_state
 from pipeline.asterix.cat240_batch import VideoBatch, decode_batch
 from pipeline.sites import RadarSite
 from pipeline.tables import Sweeps
@@ -87,16 +87,13 @@ class Assembler:
         n = len(batch)
         placed = np.empty((n, PLACED_FIELDS), np.int64)
         times = np.empty((n, 2))
-        order(
-            batch.fields, np.ascontiguousarray(arrival, np.float64), self._rules, self._order, self._clock, self._seen,
-            self._counts, placed, times,
-        )  # fmt: skip
+        arrival = np.ascontiguousarray(arrival, np.float64)
         blocks: list[Sweeps] = []
-        at, row = 0, -1
+        at, row = -1, -1
         while True:
-            at, row, full = fill(
-                batch.fields, batch.octets, placed, times, at, row, self._rules.azimuths, self._rules.first_cell,
-                self._edges, self._block, self._amplitude, self._cover, self._key, self._time, self._azimuth,
+            at, row, full = order_and_fill(
+                batch.fields, batch.octets, arrival, self._rules, self._order, self._clock, self._seen, placed, times,
+                at, row, self._edges, self._block, self._amplitude, self._cover, self._key, self._time, self._azimuth,
                 self._counts,
             )  # fmt: skip
             if full != FILLED:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from pipeline.assemble.order import LATE, MERGED, REORDERED, TAKEN
+from pipeline.assemble.order import LATE, MERGED, REORDERED, TAKEN, order
 
 DONE, FILLED = 0, 1
 """`fill` has used all messages; the open block is to be closed before it can go on."""
@@ -13,6 +13,21 @@ DONE, FILLED = 0, 1
 START, END, CLOSED, BLOCK_GAP, BLOCK_MERGED, WHOLE = range(6)
 """Block state: absolute rows of the open block or -1; rows before CLOSED are handed on; a loss was near; rows have been
 merged; complete rows."""
+
+
+@njit(nogil=True, cache=True)
+def order_and_fill(  # type: ignore[no-untyped-def]
+    fields, octets, arrival, rules, state, clock, seen, placed, times, at, row, edges, block, amplitude, cover, key,
+    time, azimuth, counts,
+):  # fmt: skip
+    """`order` first when `at` is -1, then `fill`; one call, because each return waits for the interpreter's lock."""
+    if at < 0:
+        order(fields, arrival, rules, state, clock, seen, counts, placed, times)
+        at = 0
+    return fill(
+        fields, octets, placed, times, at, row, rules.azimuths, rules.first_cell, edges, block, amplitude, cover, key,
+        time, azimuth, counts,
+    )  # fmt: skip
 
 
 @njit(nogil=True, cache=True)

@@ -56,24 +56,23 @@ FIELDS = 10
 
 def decode_batch(
     datagrams: NDArray[np.uint8], lengths: NDArray[np.int32], counters: dict[str, int]
-) -> list[tuple[VideoBatch, NDArray[np.int64]]]:
+) -> list[tuple[VideoBatch, NDArray[np.int64] | slice]]:
     """The video messages of datagrams (n, width) uint8 of `lengths` (n,) int32 octets, in order.
 
-    Gives batches, each with the datagram that every message came from. Datagrams that cannot be read are counted under
-    the reason of their DecodeError, summary messages under "summary". The batches look into `datagrams`: it must not
-    change while they are in use.
+    Gives batches, each with the index (or slice) of the datagrams that its messages came from. Datagrams that cannot be
+    read are counted under the reason of their DecodeError, summary messages under "summary". The batches look into
+    `datagrams`: it must not change while they are in use.
     """
     n = len(lengths)
     fields = np.empty((n, FIELDS), np.int64)
     good = np.empty(n, np.bool_)
-    _scan(datagrams, lengths, fields, good)
-    if good.all():
-        return [(VideoBatch(fields, datagrams), np.arange(n))] if n else []
-    batches: list[tuple[VideoBatch, NDArray[np.int64]]] = []
+    if _scan(datagrams, lengths, fields, good) == n:
+        return [(VideoBatch(fields, datagrams), slice(0, n))] if n else []
+    batches: list[tuple[VideoBatch, NDArray[np.int64] | slice]] = []
     edges = np.flatnonzero(np.diff(good)) + 1
     for low, high in zip([0, *edges.tolist()], [*edges.tolist(), n], strict=True):
         if good[low]:
-            batches.append((VideoBatch(fields[low:high], datagrams), np.arange(low, high)))
+            batches.append((VideoBatch(fields[low:high], datagrams), slice(low, high)))
         else:
             batches.append(_slowly(datagrams, lengths, range(low, high), counters))
     return [one for one in batches if len(one[0])]
@@ -101,8 +100,11 @@ def _slowly(
 
 @njit(nogil=True, cache=True)
 def _scan(datagrams, lengths, fields, good):  # type: ignore[no-untyped-def]
+    count = 0
     for i in range(lengths.shape[0]):
         good[i] = _read(datagrams[i], lengths[i], i, fields[i])
+        count += good[i]
+    return count
 
 
 @njit(nogil=True, cache=True)

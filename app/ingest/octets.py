@@ -1,0 +1,152 @@
+"""Sweeps as octets: the body of `POST /api/v1/radars/{id}/sweeps` (application/octet-stream).
+
+All numbers are little-endian. A header of 48 octets, then for each sweep 16 octets of its own and its cells:
+
+    offset  type     header
+    0       4 char   magic, "ASWP"
+    4       u16      version, 1
+    6       u16      flags: bit 0, the times are those of the sweeps; without it they are 0 and the body is refused
+    8       u32      n, sweeps in this body
+    12      u32      cells a sweep; the radar's own number
+    16      f64      range of the centre of cell 0, metres
+    24      f64      metres between cell centres
+    32      u32      azimuths a turn that the rows count in; the radar's own number
+    36      u32      number of the turn, counted by the sender; a turn may be spread over several bodies
+    40      u64      0, for later use
+
+    offset  type     sweep
+    0       f64      UTC of the sweep, seconds since 1970
+    8       u32      row: position in the turn from north, clockwise, 0 .. azimuths - 1
+    12      u32      0, for later use
+    16      u8 * c   log amplitude of each cell, nearest first
+
+Rows ascend within a body and times do not step back; a body does not pass north. The length must be
+48 + n * (16 + cells) exactly.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.contract import Refused
+from pipeline.sites import RadarSite
+from pipeline.tables import Sweeps
+
+MAGIC = b"ASWP"
+VERSION = 1
+TIMED = 1
+_HEADER = struct.Struct("<4sHHIIddIIQ")
+_ROW = 16
+_EARLIEST, _LATEST = 946684800.0, 4102444800.0
+
+
+class _Header(NamedTuple):
+    magic: bytes
+    version: int
+    flags: int
+    sweeps: int
+    cells: int
+    first_range: float
+    range_step: float
+    azimuths: int
+    scan: int
+    spare: int
+
+
+def encode_sweeps(sweeps: Sweeps, site: RadarSite) -> bytes:
+    """The octet form of a block of sweeps, for clients."""
+    video = site.video
+    n, cells = sweeps.amplitude.shape
+    header = _HEADER.pack(
+        MAGIC, VERSION, TIMED, n, cells, video.first_range_m, video.range_step_m, video.azimuths,
+        sweeps.scan % 2**32, 0,
+    )  # fmt: skip
+    rows = np.zeros(n, _row_type(cells))
+    rows["time"], rows["row"], rows["cells"] = sweeps.time, sweeps.row, sweeps.amplitude
+    return header + rows.tobytes()
+
+
+def decode_sweeps(
+    body: bytes, site: RadarSite, index: int, blocks_per_scan: int = 32
+) -> tuple[list[Sweeps], dict[str, int]]:
+    """The blocks in a body, cut at the edges of the chain's blocks, and what was taken.
+
+    index: of the radar in the engine. Gives the blocks and {"taken": sweeps}. Raises Refused, with what is wrong, when
+    anything in the body does not fit the radar; nothing is taken then.
+    """
+    header = _checked_header(body, site)
+    rows = np.frombuffer(body, _row_type(header.cells), header.sweeps, _HEADER.size)
+    row: NDArray[np.int64] = rows["row"].astype(np.int64)
+    time: NDArray[np.float64] = rows["time"].astype(np.float64)
+    _check_rows(row, time, header.azimuths)
+    azimuth = (row + 0.5) * site.video.azimuth_step_rad
+    edges = np.flatnonzero(np.diff(row * blocks_per_scan // header.azimuths)) + 1
+    blocks = []
+    for low, high in zip([0, *edges.tolist()], [*edges.tolist(), len(row)], strict=True):
+        blocks.append(
+            Sweeps(
+                radar=index,
+                scan=header.scan,
+                row=row[low:high].astype(np.int32),
+                azimuth=azimuth[low:high],
+                time=time[low:high],
+                amplitude=np.ascontiguousarray(rows["cells"][low:high]),
+                last=bool(row[high - 1] == header.azimuths - 1),
+            )
+        )
+    return blocks, {"taken": header.sweeps}
+
+
+def _row_type(cells: int) -> np.dtype[np.void]:
+    return np.dtype([("time", "<f8"), ("row", "<u4"), ("_", "<u4"), ("cells", "u1", (cells,))])
+
+
+def _checked_header(body: bytes, site: RadarSite) -> _Header:
+    video = site.video
+    if len(body) < _HEADER.size:
+        raise Refused(f"{len(body)} octets are less than the header of {_HEADER.size}")
+    header = _Header(*_HEADER.unpack_from(body))
+    if header.magic != MAGIC:
+        raise Refused("the body does not begin with ASWP")
+    if header.version != VERSION:
+        raise Refused(f"version {header.version} of the sweep form is not known, only {VERSION}")
+    if header.flags != TIMED:
+        raise Refused(f"flags {header.flags:#06x}: bit 0 (sweeps carry their time) and no other must be set")
+    if header.cells != video.ranges or header.azimuths != video.azimuths:
+        raise Refused(
+            f"{header.cells} cells and {header.azimuths} azimuths; "
+            f"radar {site.id} has {video.ranges} and {video.azimuths}"
+        )
+    if not _close(header.range_step, video.range_step_m, video.range_step_m / (2 * video.ranges)) or not _close(
+        header.first_range, video.first_range_m, video.range_step_m / 2
+    ):
+        raise Refused(
+            f"first range {header.first_range:g} m and step {header.range_step:g} m; "
+            f"radar {site.id} has {video.first_range_m:g} m and {video.range_step_m:g} m"
+        )
+    if not 0 < header.sweeps <= header.azimuths:
+        raise Refused(f"{header.sweeps} sweeps: a body holds 1 to {header.azimuths}")
+    wanted = _HEADER.size + header.sweeps * (_ROW + header.cells)
+    if len(body) != wanted:
+        raise Refused(f"{len(body)} octets; {header.sweeps} sweeps of {header.cells} cells make {wanted}")
+    return header
+
+
+def _close(given: float, own: float, tolerance: float) -> bool:
+    return math.isfinite(given) and abs(given - own) <= tolerance
+
+
+def _check_rows(row: NDArray[np.int64], time: NDArray[np.float64], azimuths: int) -> None:
+    if int(row.max()) >= azimuths:
+        raise Refused(f"row {int(row.max())} is beyond the last of {azimuths} azimuths")
+    if len(row) > 1 and int(np.diff(row).min()) <= 0:
+        raise Refused("rows must ascend; a body does not pass north")
+    if not bool(np.isfinite(time).all()) or time.min() < _EARLIEST or time.max() >= _LATEST:
+        raise Refused("times must be finite UTC seconds between the years 2000 and 2100")
+    if len(time) > 1 and float(np.diff(time).min()) < 0:
+        raise Refused("times must not step back")
