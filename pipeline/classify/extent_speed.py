@@ -1,0 +1,51 @@
+"""Classification by extent and speed, with hysteresis; what a cooperative target says of itself goes first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.tables import TargetClass
+from pipeline.track.contracts import Array
+
+
+@dataclass(frozen=True)
+class ExtentSpeed:
+    """Long or fast is an aircraft, short and slow a vehicle, what lies between stays what it was.
+
+    aircraft_length, vehicle_length: m, above and below which the smoothed extent decides. aircraft_speed: m/s, no
+    vehicle is faster. vehicle_speed: m/s, something short is called a vehicle only below it. settle: measurements of
+    the extent before it counts.
+    """
+
+    aircraft_length: float = 18.0
+    vehicle_length: float = 13.0
+    aircraft_speed: float = 45.0
+    vehicle_speed: float = 35.0
+    settle: int = 5
+
+    def __post_init__(self) -> None:
+        if not 0 < self.vehicle_length < self.aircraft_length:
+            raise ValueError("vehicle_length must be positive and less than aircraft_length")
+        if not 0 < self.vehicle_speed < self.aircraft_speed:
+            raise ValueError("vehicle_speed must be positive and less than aircraft_speed")
+
+    def __call__(
+        self, category: Array, claimed: Array, length: Array, width: Array, speed: Array, measurements: Array
+    ) -> Array:
+        """The new category (n,) uint8.
+
+        category: what each was held to be. claimed: TargetCategory of its reports, 0 when they say nothing.
+        length, width: smoothed extent m, nan when unknown. speed: m/s. measurements: how many extents were seen.
+        """
+        longest = np.fmax(length, width)
+        known = (measurements >= self.settle) & np.isfinite(longest)
+        made = category.astype(np.uint8, copy=True)
+        made[known & (longest <= self.vehicle_length) & (speed <= self.vehicle_speed)] = TargetClass.VEHICLE
+        made[known & (longest >= self.aircraft_length)] = TargetClass.AIRCRAFT
+        made[(speed >= self.aircraft_speed) & (measurements > 0)] = TargetClass.AIRCRAFT
+        return np.where(claimed > 0, claimed, made).astype(np.uint8)
+
+
+PART = ExtentSpeed

@@ -1,0 +1,1 @@
+"""Workloads and yardsticks: what is timed and how well it is done."""

@@ -1,0 +1,1 @@
+"""The central tracker: radar plots, node events and target reports update one table of tracks."""

@@ -1,0 +1,107 @@
+"""What time alone does to tracks, and two tracks of one target becoming one."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from pipeline.tables import TrackPhase
+from pipeline.track.contracts import Array, Floats
+from pipeline.track.core import Core, end, judge, strip_identity
+
+CHECK_EVERY = 1.0
+"""Seconds between two searches for doubles."""
+
+
+def keep_house(core: Core) -> None:
+    """End, coast, forget names nobody says any more and merge doubles, as of the tracker's time."""
+    judge(core)
+    if core.time - core.checked < CHECK_EVERY:
+        return
+    core.checked = core.time
+    unsaid = core.column("report_time") < core.time - core.settings.identity_hold
+    stale = np.flatnonzero((core.column("address") != "") & unsaid)
+    core.count("identity_stale", len(stale))
+    strip_identity(core, stale)
+    _merge_doubles(core)
+
+
+def _merge_doubles(core: Core) -> None:
+    """Where two tracks stay together and one of them gets no plots, the senior goes on with what both know."""
+    table, n = core.table, core.table.n
+    alive = np.flatnonzero(table.phase[:n] != TrackPhase.TENTATIVE)
+    if len(alive) < 2:
+        return
+    dt = core.time - table.time[alive]
+    state, covariance = core.filter.predict(table.state[alive], table.covariance[alive], dt)
+    order = np.argsort(state[:, 0], kind="stable")
+    name = np.unique(table.address[alive], return_inverse=True)[1]
+    name[table.address[alive] == ""] = -1
+    starved = table.radar_time[alive] < core.time - 2.2
+    double = np.full(len(alive), -1, np.int64)
+    _doubles(order, state, covariance, core.extents(alive), name, starved, table.born[alive], double)
+    table.twin[alive] = np.where(double >= 0, table.twin[alive] + 1, 0)
+    ripe = np.flatnonzero(table.twin[alive] >= core.settings.merge_after)
+    gone = np.zeros(n, np.bool_)
+    for junior in ripe:
+        senior = alive[double[junior]]
+        if not gone[senior]:
+            _absorb(core, int(senior), int(alive[junior]))
+            gone[alive[junior]] = True
+    core.count("merged", int(gone.sum()))
+    end(core, gone)
+
+
+def _absorb(core: Core, senior: int, junior: int) -> None:
+    """The senior takes the better state, and name and extent where it has none."""
+    table = core.table
+    if np.trace(table.covariance[junior, :2, :2]) < np.trace(table.covariance[senior, :2, :2]) or (
+        table.radar_time[junior] > table.radar_time[senior]
+    ):
+        for name in ("time", "state", "covariance", "one_point"):
+            getattr(table, name)[senior] = getattr(table, name)[junior]
+        table.looked[:, senior] = table.looked[:, junior]
+    if table.shapes[junior] > table.shapes[senior]:
+        for name in ("length", "width", "heading", "axis", "moving", "shapes", "category"):
+            getattr(table, name)[senior] = getattr(table, name)[junior]
+    if table.address[senior] == "" and table.address[junior] != "":
+        for name in ("address", "callsign", "claimed", "altitude", "on_ground", "simulated", "doubt"):
+            getattr(table, name)[senior] = getattr(table, name)[junior]
+        if table.claimed[senior]:
+            table.category[senior] = table.claimed[senior]
+    for name in ("updated", "radar_time", "node_time", "report_time"):
+        getattr(table, name)[senior] = max(getattr(table, name)[senior], getattr(table, name)[junior])
+    table.hits[senior] += table.hits[junior]
+    table.misses[senior] = min(table.misses[senior], table.misses[junior])
+    table.moved[senior] |= table.moved[junior]
+
+
+@njit(nogil=True, cache=True)
+def _doubles(
+    order: Array, state: Floats, cov: Floats, extent: Floats, name: Array, starved: Array, born: Floats, double: Array
+) -> None:
+    """For each track the senior it doubles, or -1. order: rows by east."""
+    far = 60.0
+    for a in range(len(order)):
+        i = order[a]
+        for b in range(a + 1, len(order)):
+            j = order[b]
+            e, n = state[j, 0] - state[i, 0], state[j, 1] - state[i, 1]
+            if e > far:
+                break
+            if abs(n) > far or not (starved[i] or starved[j]):
+                continue
+            if name[i] >= 0 and name[j] >= 0 and name[i] != name[j]:
+                continue
+            wide = (0.3 * max(extent[i, 0], extent[j, 0])) ** 2
+            s00 = cov[i, 0, 0] + cov[j, 0, 0] + wide
+            s11 = cov[i, 1, 1] + cov[j, 1, 1] + wide
+            s01 = cov[i, 0, 1] + cov[j, 0, 1]
+            squared = (e * e * s11 - 2 * e * n * s01 + n * n * s00) / (s00 * s11 - s01 * s01)
+            faster = (state[i, 2] - state[j, 2]) ** 2 + (state[i, 3] - state[j, 3]) ** 2
+            loose = cov[i, 2, 2] + cov[i, 3, 3] + cov[j, 2, 2] + cov[j, 3, 3]
+            if squared > 6.0 or faster > 5.0 * (loose + 1.0):
+                continue
+            older, younger = (i, j) if (born[i], i) <= (born[j], j) else (j, i)
+            if double[younger] < 0:
+                double[younger] = older

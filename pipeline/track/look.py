@@ -1,0 +1,115 @@
+"""When the beam of a radar passes each track, and whether all that its gate can hold has been delivered by then."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from pipeline.sites import RadarSite
+from pipeline.track.contracts import Array, Floats
+
+TWO_PI = 2 * math.pi
+
+
+@dataclass(slots=True)
+class RadarClock:
+    """One radar's antenna as seen so far. closed_to: absolute row; time: UTC s belonging to it; period: s a turn."""
+
+    period: float
+    closed_to: int = 0
+    time: float = -np.inf
+
+    def heard(self, closed_to: int, time: float, azimuths: int, nominal: float) -> None:
+        """A sector was closed; the period is learnt from what passed since the last."""
+        rows, passed = closed_to - self.closed_to, time - self.time
+        if math.isfinite(passed) and passed > 0 and azimuths // 64 <= rows <= 4 * azimuths:
+            turn = passed * azimuths / rows
+            if nominal / 4 <= turn <= nominal * 4:
+                self.period += (turn - self.period) * min(1.0, 0.5 * rows / azimuths)
+        self.closed_to, self.time = closed_to, time
+
+    def time_of(self, row: Array, azimuths: int) -> Floats:
+        """UTC s at which the antenna passed absolute rows."""
+        return np.asarray(self.time - (self.closed_to - row) * (self.period / azimuths), dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Looks:
+    """For each track (n,): row int64 absolute row of the look that is next or now, time UTC s of it, guard rows on
+    both sides that its gate covers, due: everything in its gate has been delivered, covered: in range of the radar.
+    """
+
+    row: Array
+    time: Floats
+    guard: Floats
+    due: Array
+    covered: Array
+
+
+def plan_looks(
+    site: RadarSite, clock: RadarClock, time: Array, state: Array, covariance: Array, extent: Floats, looked: Array,
+    gate: float, max_gate_m: float,
+) -> Looks:  # fmt: skip
+    """Looks of one radar at all tracks. extent: (n, 2) length and width in m. looked: rows of the looks before."""
+    n, video = len(time), site.video
+    made = Looks(np.empty(n, np.int64), np.empty(n), np.empty(n), np.empty(n, np.bool_), np.empty(n, np.bool_))
+    radar = np.array(
+        [
+            site.east,
+            site.north,
+            site.north_offset,
+            video.azimuths,
+            max(video.first_range_m - video.range_step_m, 0.0),
+            video.first_range_m + (video.ranges - 0.5) * video.range_step_m,
+            clock.period,
+            clock.time,
+            video.beamwidth_rad,
+            video.range_step_m,
+        ]
+    )
+    _plan(
+        radar, clock.closed_to, time, state, covariance, extent, looked, gate, max_gate_m,
+        made.row, made.time, made.guard, made.due, made.covered,
+    )  # fmt: skip
+    return made
+
+
+@njit(nogil=True, cache=True)
+def _plan(
+    radar: Floats, closed_to: int, time: Floats, state: Floats, cov: Floats, extent: Floats, looked: Array,
+    gate: float, max_gate: float, row: Array, at: Floats, guard: Floats, due: Array, covered: Array,
+) -> None:  # fmt: skip
+    east, north, offset, azimuths = radar[0], radar[1], radar[2], int(radar[3])
+    period, now, beamwidth, step = radar[6], radar[7], radar[8], radar[9]
+    for i in range(len(time)):
+        x, p = state[i], cov[i]
+        dt = now - time[i]
+        r = np.int64(0)
+        for turn in range(2):
+            e, n = x[0] + dt * x[2] - east, x[1] + dt * x[3] - north
+            azimuth = (math.atan2(e, n) - offset) % TWO_PI
+            modulo = min(int(azimuth / TWO_PI * azimuths), azimuths - 1)
+            if turn == 0:
+                after = looked[i] + azimuths // 2
+                r = after + 1 + (modulo - after - 1) % azimuths
+                if r < closed_to - 2 * azimuths:
+                    r += (closed_to - r) // azimuths * azimuths
+            else:
+                r += (modulo - r + azimuths // 2) % azimuths - azimuths // 2
+            dt = now - (closed_to - r) * period / azimuths - time[i]
+        distance = math.sqrt(e * e + n * n)
+        spread = p[0, 0] + p[1, 1] + 2 * dt * (p[0, 2] + p[1, 3]) + dt * dt * (p[2, 2] + p[3, 3])
+        spread += 4.0 * abs(dt) ** 3 + (distance * beamwidth) ** 2 + step * step + 0.1 * extent[i, 0] ** 2
+        reach = min(math.sqrt(gate * max(spread, 0.0)), max_gate) + 0.5 * extent[i, 0] + 2.0 * step
+        guard[i] = min(reach / max(distance, 1.0), 0.5 * math.pi) / TWO_PI * azimuths + 1.0
+        # a scan left out is one look, not as many as turns went by
+        late = int((closed_to - guard[i] - r) // azimuths)
+        if late > 0:
+            r += late * azimuths
+            dt += late * period
+        row[i], at[i] = r, time[i] + dt
+        due[i] = r + guard[i] <= closed_to
+        covered[i] = radar[4] <= distance <= radar[5]

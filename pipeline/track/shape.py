@@ -1,0 +1,129 @@
+"""Extent and heading of a track from the plots it takes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from pipeline.tables import Plots
+from pipeline.track.contracts import Array, Floats
+
+
+@dataclass(frozen=True)
+class ShapeRule:
+    """grow, shrink: part of a longer or shorter extent taken per plot (a target hides more easily than it grows).
+
+    start_speed, stop_speed: m/s above and below which a course gives the heading. reverse_speed: up to it a target
+    may move backwards (push-back). bearing_sd: rad, plots less sure of their long axis do not turn the heading.
+    """
+
+    grow: float = 0.2
+    shrink: float = 0.1
+    start_speed: float = 2.5
+    stop_speed: float = 1.2
+    reverse_speed: float = 4.0
+    bearing_sd: float = 0.25
+
+
+def plot_extents(plots: Plots) -> Floats:
+    """(m, 3) length, width in m and bearing in rad modulo pi (nan when unknown) of plots, filled from the polar
+    extents where the extractor gave no axes.
+    """
+    made = np.empty((len(plots), 3))
+    made[:, 0], made[:, 1], made[:, 2] = plots.length, plots.width, plots.bearing
+    bare = ~(np.isfinite(made[:, 0]) & (made[:, 0] > 0))
+    if bare.any():
+        deep = np.nan_to_num(plots.range_extent[bare].astype(np.float64), posinf=0.0)
+        wide = np.nan_to_num(plots.azimuth_extent[bare] * plots.range[bare], posinf=0.0)
+        made[bare, 0], made[bare, 1] = np.maximum(deep, wide), np.minimum(deep, wide)
+        across = plots.azimuth[bare] + math.pi / 2
+        made[bare, 2] = np.where(deep >= wide, plots.azimuth[bare], across) % math.pi
+    made[:, 1] = np.where(np.isfinite(made[:, 1]), made[:, 1], 0.0)
+    return np.clip(made, [0.0, 0.0, -np.inf], [200.0, 200.0, np.inf])
+
+
+def extents(length: Array, width: Array, heading: Array, axis: Array) -> Floats:
+    """(n, 3) length, width and direction of tracks for gating; zeros where unknown."""
+    direction = np.where(np.isfinite(heading), heading, axis)
+    return np.asarray(np.nan_to_num(np.stack([length, width, direction], axis=1)))
+
+
+def oriented_noise(noise: Floats, extent: Floats, part: float) -> Floats:
+    """noise (m, 2, 2) plus the wander of an extended target's centroid: sd `part` of its length and of its width."""
+    direction = np.where(np.isfinite(extent[:, 2]), extent[:, 2], 0.0)
+    along, across = (part * extent[:, 0]) ** 2, (part * extent[:, 1]) ** 2
+    across = np.where(np.isfinite(extent[:, 2]), across, along)
+    s, c = np.sin(direction), np.cos(direction)
+    made = noise.copy()
+    made[:, 0, 0] += along * s * s + across * c * c
+    made[:, 1, 1] += along * c * c + across * s * s
+    made[:, 0, 1] += (along - across) * s * c
+    made[:, 1, 0] += (along - across) * s * c
+    return made
+
+
+def reshape(
+    rule: ShapeRule, rows: Array, state: Array, plot: Floats, bearing_sd: Array, length: Array, width: Array,
+    heading: Array, axis: Array, moving: Array, shapes: Array,
+) -> None:  # fmt: skip
+    """Smooth extent and heading of the tracks `rows` with the plot (k, 3) each took; the columns are changed."""
+    settings = np.array([
+        rule.grow, rule.shrink, rule.start_speed, rule.stop_speed, rule.reverse_speed, rule.bearing_sd
+    ])  # fmt: skip
+    _reshape(settings, rows, state, plot, bearing_sd, length, width, heading, axis, moving, shapes)
+
+
+@njit(nogil=True, cache=True)
+def _axis_difference(a: float, b: float) -> float:
+    """a - b of two directions without sense, in (-pi/2, pi/2]."""
+    return (a - b + 0.5 * math.pi) % math.pi - 0.5 * math.pi
+
+
+@njit(nogil=True, cache=True)
+def _turn(a: float, b: float) -> float:
+    """a - b of two directions, in (-pi, pi]."""
+    return (a - b + math.pi) % (2 * math.pi) - math.pi
+
+
+@njit(nogil=True, cache=True)
+def _reshape(
+    rule: Floats, rows: Array, state: Floats, plot: Floats, bearing_sd: Array, length: Floats, width: Floats,
+    heading: Floats, axis: Floats, moving: Array, shapes: Array,
+) -> None:  # fmt: skip
+    for k in range(len(rows)):
+        i = rows[k]
+        long, short, bearing = plot[k, 0], plot[k, 1], plot[k, 2]
+        sure = math.isfinite(bearing) and (not math.isfinite(bearing_sd[k]) or bearing_sd[k] <= rule[5])
+        speed = math.hypot(state[i, 2], state[i, 3])
+        moving[i] = speed > (rule[3] if moving[i] else rule[2])
+        if sure:
+            if not math.isfinite(axis[i]):
+                axis[i] = bearing % math.pi
+            else:
+                axis[i] = (axis[i] + 0.2 * _axis_difference(bearing, axis[i])) % math.pi
+        if moving[i]:
+            course = math.atan2(state[i, 2], state[i, 3])
+            known = math.isfinite(heading[i])
+            backwards = known and speed < rule[4] and math.cos(course - heading[i]) < -0.5
+            aim = course + math.pi if backwards else course
+            # the long axis tells the nose better than the course does, as long as they agree
+            if sure and long > 1.8 * short and abs(_axis_difference(bearing, aim)) < 0.35:
+                aim += 0.5 * _axis_difference(bearing, aim)
+            if known:
+                difference = _turn(aim, heading[i])
+                aim = heading[i] + difference * (0.5 if abs(difference) < 0.6 else 1.0)
+            heading[i] = aim % (2 * math.pi)
+        if not long > 0.0:
+            continue
+        pointing = heading[i] if math.isfinite(heading[i]) else axis[i]
+        if math.isfinite(bearing) and math.isfinite(pointing) and abs(_axis_difference(bearing, pointing)) > 0.785:
+            long, short = short, long
+        if shapes[i] == 0:
+            length[i], width[i] = long, short
+        else:
+            length[i] += (rule[0] if long > length[i] else rule[1]) * (long - length[i])
+            width[i] += (rule[0] if short > width[i] else rule[1]) * (short - width[i])
+        shapes[i] += 1

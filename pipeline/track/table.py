@@ -1,0 +1,166 @@
+"""The tracker's own table: one column a fact, room for `capacity` tracks, the first `n` rows are alive."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pipeline.track.contracts import Array
+
+NEVER = -np.inf
+"""The time of what has not happened."""
+
+_COLUMNS: dict[str, tuple[str, tuple[int, ...], Any]] = {
+    "uid": ("i8", (), 0),
+    "id": ("i4", (), 0),
+    "time": ("f8", (), 0.0),
+    "state": ("f8", (4,), 0.0),
+    "covariance": ("f8", (4, 4), 0.0),
+    "phase": ("u1", (), 0),
+    "one_point": ("?", (), True),
+    "updated": ("f8", (), 0.0),
+    "born": ("f8", (), 0.0),
+    "birthplace": ("f8", (2,), 0.0),
+    "moved": ("?", (), False),
+    "hits": ("i4", (), 0),
+    "misses": ("i4", (), 0),
+    "history": ("u4", (), 0),
+    "looks": ("i4", (), 0),
+    "length": ("f8", (), np.nan),
+    "width": ("f8", (), np.nan),
+    "heading": ("f8", (), np.nan),
+    "axis": ("f8", (), np.nan),
+    "moving": ("?", (), False),
+    "shapes": ("i4", (), 0),
+    "altitude": ("f8", (), np.nan),
+    "on_ground": ("?", (), True),
+    "category": ("u1", (), 0),
+    "claimed": ("u1", (), 0),
+    "address": ("U6", (), ""),
+    "callsign": ("U8", (), ""),
+    "doubt": ("i4", (), 0),
+    "radar_time": ("f8", (), NEVER),
+    "node_time": ("f8", (), NEVER),
+    "report_time": ("f8", (), NEVER),
+    "simulated": ("?", (), False),
+    "twin": ("i4", (), 0),
+}
+
+
+class TrackTable:
+    """Columns of `capacity` rows of which the first `n` are alive, in order of birth.
+
+    looked: (radars, capacity) int64, absolute row of each radar's last look at the track.
+    one_point: the velocity is not known yet. birthplace: where it was first seen. history: hits by look, newest in
+    bit 0. axis: rad modulo pi, long axis as the radar sees it. shapes: extents seen. claimed: TargetCategory of its
+    reports. doubt: reports in a row that did not fit. twin: checks in a row that found it to double another.
+    The other columns are those of `Tracks`.
+    """
+
+    uid: Array
+    id: Array
+    time: Array
+    state: Array
+    covariance: Array
+    phase: Array
+    one_point: Array
+    updated: Array
+    born: Array
+    birthplace: Array
+    moved: Array
+    hits: Array
+    misses: Array
+    history: Array
+    looks: Array
+    length: Array
+    width: Array
+    heading: Array
+    axis: Array
+    moving: Array
+    shapes: Array
+    altitude: Array
+    on_ground: Array
+    category: Array
+    claimed: Array
+    address: Array
+    callsign: Array
+    doubt: Array
+    radar_time: Array
+    node_time: Array
+    report_time: Array
+    simulated: Array
+    twin: Array
+
+    def __init__(self, capacity: int, radars: int) -> None:
+        self.capacity = capacity
+        self.n = 0
+        self.last_uid = 0
+        for name, (dtype, shape, fill) in _COLUMNS.items():
+            setattr(self, name, np.full((capacity, *shape), fill, dtype=dtype))
+        self.looked = np.zeros((radars, capacity), dtype=np.int64)
+
+    def append(self, rows: int) -> slice:
+        """Make up to `rows` new rows with default values; fewer when the table is full."""
+        made = slice(self.n, min(self.n + rows, self.capacity))
+        for name, (_, _, fill) in _COLUMNS.items():
+            getattr(self, name)[made] = fill
+        count = made.stop - made.start
+        self.uid[made] = np.arange(self.last_uid + 1, self.last_uid + 1 + count)
+        self.last_uid += count
+        self.n = made.stop
+        return made
+
+    def keep(self, mask: Array) -> None:
+        """Keep the living rows of the mask (n,), in order."""
+        rows = np.flatnonzero(mask)
+        for name in _COLUMNS:
+            column = getattr(self, name)
+            column[: len(rows)] = column[rows]
+        self.looked[:, : len(rows)] = self.looked[:, rows]
+        self.n = len(rows)
+
+    def save(self) -> dict[str, Any]:
+        """Copies of all living rows and the counters of the table."""
+        columns = {name: getattr(self, name)[: self.n].copy() for name in _COLUMNS}
+        return {**columns, "looked": self.looked[:, : self.n].copy(), "last_uid": self.last_uid}
+
+    def restore(self, saved: dict[str, Any]) -> None:
+        """Take what `save` gave. Raises ValueError when it does not fit the capacity or the radars."""
+        n = len(saved["uid"])
+        if n > self.capacity or saved["looked"].shape != (len(self.looked), n):
+            raise ValueError("the saved tracks do not fit this tracker")
+        for name in _COLUMNS:
+            getattr(self, name)[:n] = saved[name]
+        self.looked[:, :n] = saved["looked"]
+        self.n, self.last_uid = n, int(saved["last_uid"])
+
+
+class TrackNumbers:
+    """Numbers 1 .. 4095 given in turn, so that the longest unused comes next; those in `rest` s stay unused."""
+
+    LAST = 4095
+
+    def __init__(self, rest: float = 120.0) -> None:
+        self.rest = rest
+        self.next = 1
+        self.free_at = np.full(self.LAST + 1, NEVER)
+
+    def take(self, time: float) -> int:
+        """The next free number, 0 when none is free."""
+        turn = np.r_[self.next : self.LAST + 1, 1 : self.next]
+        free = turn[self.free_at[turn] <= time]
+        if not len(free):
+            free = turn[np.isfinite(self.free_at[turn])]
+            if not len(free):
+                return 0
+            free = free[np.argsort(self.free_at[free], kind="stable")]
+        number = int(free[0])
+        self.free_at[number] = np.inf
+        self.next = number % self.LAST + 1
+        return number
+
+    def give_back(self, numbers: Array, time: float) -> None:
+        """These numbers are free after their rest."""
+        self.free_at[numbers] = time + self.rest
+        self.free_at[0] = NEVER
