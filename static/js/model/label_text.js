@@ -1,0 +1,51 @@
+// What a label says.
+
+import { feet, isNumber, knots } from './format.js';
+import { STANDING_MPS } from './motion.js';
+
+/** @typedef {import('../types.js').Track} Track */
+
+/** @param {Track} track @returns {string} the name a controller calls it by: callsign, else the track number */
+export const nameOf = (track) => (track.callsign && track.callsign.trim()) || `#${track.id}`;
+
+/** @param {Track} track @returns {boolean} */
+export const isCoasting = (track) => track.phase === 'coasting';
+
+/** @param {Track} track @returns {boolean} */
+export const isAirborne = (track) => track.on_ground === false;
+
+/** @param {Track} track @returns {boolean} it does not move */
+export const isStanding = (track) => !isNumber(track.speed_mps) || track.speed_mps < STANDING_MPS;
+
+/** @param {Track} track @returns {'aircraft'|'vehicle'|'unknown'} */
+export function classOf(track) {
+  const name = String(track.class ?? '').toLowerCase();
+  return name === 'aircraft' || name === 'vehicle' ? name : 'unknown';
+}
+
+/**
+ * @param {Track} track @param {'short'|'full'} level @param {number} coastedS seconds without a measurement
+ * @returns {import('../types.js').LabelText}
+ */
+export function labelText(track, level, coastedS) {
+  const coasting = isCoasting(track);
+  const first = `${nameOf(track)}${track.phase === 'tentative' ? '?' : ''}`;
+  const mark = track.simulated ? 'SIM' : '';
+  if (level === 'short') return { first, second: coasting ? `C${Math.round(coastedS)}` : '', mark: '' };
+  /** @type {string[]} */
+  const parts = [];
+  if (coasting) parts.push(`COAST ${Math.round(coastedS)} s`);
+  if (isAirborne(track) && isNumber(track.altitude_m)) parts.push(`${Math.round((feet(track.altitude_m) ?? 0) / 10) * 10} ft`);
+  const speed = knots(track.speed_mps);
+  if (speed !== null && !isStanding(track)) parts.push(`${Math.round(speed)} kt`);
+  const place = track.runway ? `RWY ${track.runway}` : shortPlace(track.zone);
+  if (place && !coasting) parts.push(place);
+  return { first, second: parts.join('  '), mark };
+}
+
+/** @param {string|null|undefined} zone @returns {string} a taxiway or stand name that fits a label */
+export function shortPlace(zone) {
+  if (!zone) return '';
+  const name = String(zone).trim();
+  return name.length <= 6 && !name.includes(':') && !/^\d{4,}$/.test(name) ? name : '';
+}

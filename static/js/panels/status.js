@@ -1,0 +1,66 @@
+// The top bar and the banner: who we are, what kind of picture this is, how old it is, and whether it still comes.
+
+import { clock } from '../model/format.js';
+import { byId, setText } from './dom.js';
+
+/** @typedef {'ok'|'late'|'lost'|'starting'} Health */
+
+/**
+ * @param {number} nowMs @param {number} lastMessageMs @param {number} lastPictureMs local clock of the newest tracks
+ * @param {number} periodS
+ * @returns {Health} lost: nothing at all for twice the period (2 s at least); late: messages come, but no new tracks
+ */
+export function healthOf(nowMs, lastMessageMs, lastPictureMs, periodS) {
+  if (lastPictureMs === -Infinity && lastMessageMs === -Infinity) return 'starting';
+  const limit = Math.max(2, 2 * periodS) * 1000;
+  if (nowMs - lastMessageMs > limit) return 'lost';
+  if (nowMs - lastPictureMs > Math.max(3000, 3 * periodS * 1000)) return 'late';
+  return 'ok';
+}
+
+/** Shows what `healthOf` finds. */
+export class StatusBar {
+  constructor() {
+    this.banner = byId('banner');
+    this.age = byId('data-age');
+    this.utc = byId('data-clock');
+    this.badge = byId('mode');
+    this.toastTimer = 0;
+    /** @type {Health} */
+    this.health = 'starting';
+  }
+
+  /**
+   * @param {import('../feed/picture.js').PictureState} picture @param {import('../feed/live.js').LiveFeed} feed
+   * @param {import('../feed/live.js').LinkState} link @param {number} nowMs
+   */
+  update(picture, feed, link, nowMs) {
+    const health = healthOf(nowMs, feed.lastMessageMs, picture.timeMs, feed.periodS);
+    this.health = health;
+    const age = (nowMs - picture.timeMs) / 1000;
+    setText(this.utc, clock(picture.time));
+    setText(this.age, Number.isFinite(age) ? `${age < 10 ? age.toFixed(1) : Math.round(age)} s` : '–');
+    document.body.dataset.health = health;
+    const starting = health === 'starting';
+    const text = health === 'lost' ? `FEED LOST – the picture is ${Number.isFinite(age) ? `${Math.round(age)} s` : 'not'} old. Do not use. ${link === 'live' ? '' : 'Reconnecting…'}`
+      : health === 'late' ? `PICTURE LATE – no new tracks for ${Math.round(age)} s` : '';
+    this.banner.hidden = !text;
+    setText(this.banner, Number.isFinite(age) || !text ? text : 'FEED LOST – no picture. Reconnecting…');
+    this.banner.dataset.kind = health;
+    const mode = picture.mode;
+    this.badge.hidden = mode === 'live';
+    setText(this.badge, mode === 'demo' ? 'DEMO · simulated' : mode === 'replay' ? 'REPLAY · not live' : mode);
+    setText(byId('link'), starting ? 'connecting' : health === 'ok' ? 'live' : health);
+    setText(byId('count'), `${picture.targets.size} targets`);
+  }
+
+  /** Say something for a few seconds. @param {string} text @param {'note'|'error'} [kind] */
+  toast(text, kind = 'note') {
+    const box = byId('toast');
+    box.textContent = text;
+    box.dataset.kind = kind;
+    box.hidden = false;
+    clearTimeout(this.toastTimer);
+    this.toastTimer = window.setTimeout(() => { box.hidden = true; }, kind === 'error' ? 8000 : 2500);
+  }
+}

@@ -1,0 +1,176 @@
+// The shapes that cross module borders. No code: types only, for `tsc --checkJs`.
+
+/**
+ * A track as it stands on the wire (`GET /api/v1/picture`, topic `tracks`). Absent values are null.
+ * @typedef {object} Track
+ * @property {number} id
+ * @property {number} time  UTC seconds of the state
+ * @property {number|null} lat
+ * @property {number|null} lon
+ * @property {number} east_m
+ * @property {number} north_m
+ * @property {number|null} speed_mps
+ * @property {number|null} course_deg
+ * @property {number|null} heading_deg
+ * @property {number|null} length_m
+ * @property {number|null} width_m
+ * @property {string|null} class  aircraft, vehicle, unknown
+ * @property {string|null} callsign
+ * @property {string|null} address
+ * @property {string|null} phase  tentative, confirmed, coasting
+ * @property {string|null} zone
+ * @property {string|null} runway
+ * @property {string[]|null} sources
+ * @property {number|null} accuracy_m
+ * @property {boolean|null} simulated
+ * @property {number|null} [altitude_m]
+ * @property {boolean|null} [on_ground]
+ */
+
+/**
+ * @typedef {object} AlertTarget
+ * @property {number} track
+ * @property {string|null} [callsign]
+ * @property {string|null} [class]
+ * @property {number|null} [east_m]
+ * @property {number|null} [north_m]
+ */
+
+/**
+ * @typedef {object} Alert
+ * @property {number} id
+ * @property {string} rule
+ * @property {'information'|'alarm'} stage
+ * @property {'new'|'ongoing'|'acknowledged'|'cleared'} state
+ * @property {string} text
+ * @property {number|null} raised_at
+ * @property {number|null} updated_at
+ * @property {number|null} cleared_at
+ * @property {string|null} clear_reason
+ * @property {number|null} acknowledged_at
+ * @property {string|null} acknowledged_by
+ * @property {string|null} runway
+ * @property {string|null} holding_point
+ * @property {number|null} time_to_threshold_s
+ * @property {boolean} aural
+ * @property {boolean} simulated
+ * @property {AlertTarget[]} targets
+ */
+
+/**
+ * @typedef {object} RunwayState
+ * @property {string} id
+ * @property {boolean} open
+ * @property {string|null} in_use
+ * @property {'normal'|'low'} visibility
+ * @property {number[]} occupants
+ * @property {number|null} next_arrival
+ * @property {number|null} next_arrival_s
+ */
+
+/**
+ * @typedef {object} SensorState
+ * @property {string} id
+ * @property {string} kind
+ * @property {string} status  ok, degraded, silent, waiting
+ * @property {number|null} last
+ * @property {boolean} simulated
+ * @property {string} detail
+ * @property {Record<string, number>} counters
+ */
+
+/**
+ * What is shown of one target: its newest track and how it moves on the screen.
+ * @typedef {object} Target
+ * @property {Track} track
+ * @property {number} baseMs  local clock when the newest track arrived
+ * @property {number} ageS  how old the state was then
+ * @property {number} ve  m/s
+ * @property {number} vn  m/s
+ * @property {number} offsetE  what the old picture was off by, fading away
+ * @property {number} offsetN
+ * @property {number|null} heading  rad, clockwise from north
+ * @property {number} headingOffset  rad, fading away
+ * @property {number} coastingSince  UTC s when it began to coast, NaN when it does not
+ * @property {number} goneMs  local clock when it left the feed, 0 while it is there
+ * @property {{e: number, n: number, t: number}[]} history
+ * @property {LabelPlace} label
+ * @property {number} x  screen position in this frame, CSS pixels
+ * @property {number} y
+ * @property {number} e  position in this frame, metres
+ * @property {number} n
+ */
+
+/**
+ * Where a label lies relative to its target, CSS pixels.
+ * @typedef {object} LabelPlace
+ * @property {number} slot  -1 when it has none
+ * @property {number} dx  wanted offset of the box's corner from the target
+ * @property {number} dy
+ * @property {number} sx  offset shown now, following the wanted one
+ * @property {number} sy
+ * @property {number} w
+ * @property {number} h
+ * @property {boolean} visible
+ * @property {{dx: number, dy: number}|null} pinned
+ * @property {LabelText|null} text
+ */
+
+/**
+ * @typedef {object} LabelText
+ * @property {string} first
+ * @property {string} second
+ * @property {string} mark  a small tag after the first line
+ */
+
+/** @typedef {'off'|'short'|'full'} LabelLevel */
+
+/**
+ * A palette. `css` become custom properties of the page; the rest is for the canvases.
+ * @typedef {object} Theme
+ * @property {string} name
+ * @property {Record<string, string>} css
+ * @property {Record<string, string>} map
+ * @property {Record<string, string>} ink
+ */
+
+/**
+ * A feature of the map in local metres, ready to draw.
+ * @typedef {object} MapFeature
+ * @property {string} id
+ * @property {string} kind  AMDB name
+ * @property {string} name
+ * @property {Record<string, any>} properties
+ * @property {'polygon'|'line'|'point'} shape
+ * @property {number[][][]} rings  polygons: rings; lines: lines; points: one ring of one point
+ * @property {{e: number, n: number}} centre
+ */
+
+/**
+ * @typedef {object} RunwayEndShape
+ * @property {string} designator
+ * @property {number} e
+ * @property {number} n
+ * @property {number} heading  rad, of a landing
+ */
+
+/**
+ * @typedef {object} RunwayShape
+ * @property {string} id
+ * @property {[RunwayEndShape, RunwayEndShape]} ends
+ * @property {number} width
+ * @property {number[][][]} rings
+ */
+
+/**
+ * @typedef {object} AirportMap
+ * @property {string} icao
+ * @property {string} name
+ * @property {string} attribution
+ * @property {import('./geo/projection.js').Projection} projection
+ * @property {MapFeature[]} features
+ * @property {RunwayShape[]} runways
+ * @property {{west: number, east: number, south: number, north: number}} bounds
+ */
+
+export {};
