@@ -45,6 +45,7 @@ class HoldEntry(RuleSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        object.__setattr__(self, "inform", tuple(self.inform))  # a settings file gives a list
         names = {one.name.lower() for one in TargetClass}
         if not set(self.inform) <= names:
             raise ValueError(f"inform: a list of classes wanted, out of {', '.join(sorted(names))}")
