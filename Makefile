@@ -14,6 +14,10 @@ UV := .uv/bin/uv
 UV_WANTED := .uv/bin/uv
 endif
 export UV_PYTHON_DOWNLOADS := never
+ifneq ($(wildcard /etc/ssl/certs/ca-certificates.crt),)
+# a network with its own certificate authority has it there
+export UV_SYSTEM_CERTS := true
+endif
 PIP := $(UV) pip install --quiet --python $(BIN)/python
 
 .DEFAULT_GOAL := help

@@ -13,7 +13,7 @@ import numpy as np
 from pipeline.airport.model import Airport
 from pipeline.alert.conflict import Conflict
 from pipeline.monitor.geometry import HoldFrames, RunwayFrames
-from pipeline.monitor.holds import HoldMemory, HoldSettings, watch_holds
+from pipeline.monitor.holds import Entry, HoldMemory, HoldSettings, watch_holds
 from pipeline.monitor.life import Case, LifeSettings, write_alert
 from pipeline.monitor.situation import Situation, SituationSettings, observe
 from pipeline.picture import Alert, AlertChange, RunwayState, Visibility
@@ -217,7 +217,14 @@ class AlertMonitor:
         )
         rows = {int(n): row for row, n in enumerate(tracks.id)}
         entries = {rows[n]: entry for n, entry in state.holds.entries.items() if n in rows}
-        return replace(situation, entries=entries)
+        return replace(situation, entries={row: e for row, e in entries.items() if self._serious(situation, row, e)})
+
+    def _serious(self, s: Situation, row: int, entry: Entry) -> bool:
+        runway = int(self._hold_frames.runway[entry.hold])
+        if s.depth[runway, row] > 0:
+            return True
+        soon = s.position[row] + s.velocity[row] * self._entry.soon_s
+        return bool(self._frames.depth(runway, s.runways[runway].visibility, soon[None, :])[0] > 0)
 
     @staticmethod
     def _lined_up(s: Situation) -> Any:
