@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-import sys
 from typing import Annotated
 
 import typer
@@ -40,12 +39,6 @@ def airside(
 
 for _module in pkgutil.iter_modules(__path__):
     importlib.import_module(f"app.cli.{_module.name}").register(app)
-
-
-def fail(message: str, code: int = 2) -> typer.Exit:
-    """Say what is wrong on standard error; use as `raise fail(...)`."""
-    print(f"airside: {message}", file=sys.stderr)
-    return typer.Exit(code)
 
 
 def main() -> None:
