@@ -84,7 +84,7 @@ def decode_sweeps(
     row: NDArray[np.int64] = rows["row"].astype(np.int64)
     time: NDArray[np.float64] = rows["time"].astype(np.float64)
     _check_rows(row, time, header.azimuths)
-    azimuth = (row + 0.5) * site.video.azimuth_step_rad
+    azimuth = np.asarray((row + 0.5) * site.video.azimuth_step_rad, np.float64)
     edges = np.flatnonzero(np.diff(row * blocks_per_scan // header.azimuths)) + 1
     blocks = []
     for low, high in zip([0, *edges.tolist()], [*edges.tolist(), len(row)], strict=True):
