@@ -67,9 +67,13 @@ class FilterPart(Protocol):
 class AssociatePart(Protocol):
     """Decides which measurement belongs to which track."""
 
-    gate: float
-    max_gate_m: float
-    extent_sd: float
+    @property
+    def gate(self) -> float:
+        """Bound of the squared distance."""
+
+    @property
+    def max_gate_m(self) -> float:
+        """Bound of the distance in metres."""
 
     def __call__(self, tracks: Expected, measured: Measured) -> Assignment:
         """The best assignment of all tracks at once; a measurement serves one track at most."""

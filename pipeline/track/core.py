@@ -92,6 +92,7 @@ class Core:
     counters: dict[str, int]
     undecided: dict[str, tuple[int, int]] = field(default_factory=dict)
     time: float = NEVER
+    judged: float = NEVER
     checked: float = NEVER
 
     def count(self, reason: str, number: int = 1) -> None:
@@ -118,6 +119,7 @@ class Core:
         finite = np.isfinite(time)
         self.count(f"{kind}_invalid", int((~finite).sum()))
         if self.table.n == 0 and not self.timed:
+            self.time = NEVER  # nothing is held that time could harm: it starts anew
             return finite
         late = finite & (time < self.time - self.settings.max_lag)
         lead = finite & (time > self.time + self.settings.max_lead) if self.timed else np.zeros(len(time), np.bool_)

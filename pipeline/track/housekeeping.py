@@ -9,14 +9,20 @@ from pipeline.tables import TrackPhase
 from pipeline.track.contracts import Array, Floats
 from pipeline.track.core import Core, end, judge, strip_identity
 
+JUDGE_EVERY = 0.12
+"""Seconds between two looks at all tracks; less than any radar needs to come round."""
+
 CHECK_EVERY = 1.0
 """Seconds between two searches for doubles."""
 
 
 def keep_house(core: Core) -> None:
     """End, coast, forget names nobody says any more and merge doubles, as of the tracker's time."""
+    if abs(core.time - core.judged) < JUDGE_EVERY:
+        return
+    core.judged = core.time
     judge(core)
-    if core.time - core.checked < CHECK_EVERY:
+    if abs(core.time - core.checked) < CHECK_EVERY:
         return
     core.checked = core.time
     unsaid = core.column("report_time") < core.time - core.settings.identity_hold

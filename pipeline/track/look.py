@@ -39,7 +39,8 @@ class RadarClock:
 @dataclass(frozen=True, slots=True, eq=False)
 class Looks:
     """For each track (n,): row int64 absolute row of the look that is next or now, time UTC s of it, guard rows on
-    both sides that its gate covers, due: everything in its gate has been delivered, covered: in range of the radar.
+    both sides that its gate covers, due: everything in its gate has been delivered, covered: in range of the radar
+    and not looked at within the last half turn.
     """
 
     row: Array
@@ -85,6 +86,9 @@ def _plan(
     east, north, offset, azimuths = radar[0], radar[1], radar[2], int(radar[3])
     period, now, beamwidth, step = radar[6], radar[7], radar[8], radar[9]
     for i in range(len(time)):
+        if looked[i] + azimuths // 2 > closed_to:
+            row[i], at[i], guard[i], due[i], covered[i] = looked[i] + azimuths, now, 0.0, False, False
+            continue
         x, p = state[i], cov[i]
         dt = now - time[i]
         r = np.int64(0)

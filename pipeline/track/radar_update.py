@@ -32,8 +32,10 @@ def take_sector(core: Core, sector: SectorPlots) -> None:
     rows = _absolute_rows(core, sector.radar, plots)
     stale = rows < sector.closed_to - 2 * site.video.azimuths
     core.count("plot_stale", int(stale.sum()))
-    plots, rows = plots[~stale], rows[~stale]
-    core.waiting[sector.radar] = plots[_decide(core, sector, plots, rows)]
+    if stale.any():
+        plots, rows = plots[~stale], rows[~stale]
+    wait = _decide(core, sector, plots, rows)
+    core.waiting[sector.radar] = plots[wait] if wait.any() else Plots.empty()
 
 
 def _acceptable(core: Core, sector: SectorPlots) -> bool:
@@ -52,6 +54,8 @@ def _acceptable(core: Core, sector: SectorPlots) -> bool:
             core.count("sector_late")
             return False
         _restart(core, sector)
+    if core.table.n == 0:
+        core.time = sector.time  # nothing is held that time could harm: it starts anew
     return True
 
 
@@ -61,8 +65,6 @@ def _restart(core: Core, sector: SectorPlots) -> None:
     core.clocks[sector.radar] = RadarClock(core.radars[sector.radar].video.period_s)
     core.waiting[sector.radar] = Plots.empty()
     core.table.looked[sector.radar] = sector.closed_from - core.radars[sector.radar].video.azimuths // 2
-    if core.table.n == 0:
-        core.time = sector.time
 
 
 def _usable(core: Core, sector: SectorPlots) -> Plots:
@@ -80,7 +82,8 @@ def _usable(core: Core, sector: SectorPlots) -> Plots:
     future = sane & (plots.time > sector.time + 0.5 * period)
     core.count("plot_late", int(late.sum()))
     core.count("plot_future", int(future.sum()))
-    return plots[sane & ~late & ~future]
+    good = sane & ~late & ~future
+    return plots if good.all() else plots[good]
 
 
 def _absolute_rows(core: Core, radar: int, plots: Plots) -> Array:
@@ -216,7 +219,8 @@ def _begin(core: Core, sector: SectorPlots, plots: Plots, plot_rows: Array, posi
     if core.settings.ignore_plots_on_buildings:
         built = core.zones.kind(plots.east, plots.north) == SurfaceKind.BUILDING
         core.count("plot_on_building", int(built.sum()))
-        plots, plot_rows, position = plots[~built], plot_rows[~built], position[~built]
+        if built.any():
+            plots, plot_rows, position = plots[~built], plot_rows[~built], position[~built]
     shape = plot_extents(plots)
     noise = oriented_noise(plots.covariance, shape, core.settings.wander)
     made = start(core, plots.time, position, noise, Source.RADAR, core.radars[sector.radar].simulated)

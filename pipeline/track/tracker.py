@@ -22,7 +22,7 @@ from pipeline.track.table import NEVER
 
 PAVED = (SurfaceKind.RUNWAY, SurfaceKind.TAXIWAY, SurfaceKind.APRON, SurfaceKind.ROAD)
 _SAME = ("id", "phase", "updated", "born", "hits", "misses", "altitude", "on_ground", "category", "address", "callsign")
-_SAVED = ("numbers", "clocks", "waiting", "undecided", "time", "checked")
+_SAVED = ("numbers", "clocks", "waiting", "undecided", "time", "judged", "checked")
 
 
 class Tracker:
@@ -84,6 +84,7 @@ class Tracker:
             core.count("time_backwards")
         else:
             core.time = time
+            core.judged = min(core.judged, time - 1.0)
             keep_house(core)
 
     def tracks(self, time: float | None = None) -> Tracks:
