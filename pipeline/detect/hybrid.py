@@ -1,0 +1,287 @@
+"""Hybrid CFAR: the mean log amplitude of a macro-cell, averaged over scans, plus a constant.
+
+G. Galati, M. Leonardi, A. Cavallin, G. Pavan, "Airport surveillance processing chain for high resolution radar",
+section 3, equation (1.1) and figure 3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipeline.detect.calibration import estimation_loss_db, threshold_offset_db
+from pipeline.kernels.bits import add_pairs, bits_above
+from pipeline.kernels.run_cap import CapSettings, fit_row
+from pipeline.state import ArrayState, read_only, remembered
+from pipeline.tables import Detections, Sweeps, VideoFormat
+
+STRIPE_ROWS = 8
+"""Macro-cells are made of stripes of this many rows (fewer where a macro-cell itself has fewer)."""
+
+PAIR_ROWS = 128
+"""Rows whose sums of two bytes fit 16 bits."""
+
+
+@dataclass(frozen=True)
+class MacroCells:
+    """The polar grid of macro-cells, each as near to square as the grid lets it be, in rings of whole groups of 8 range
+    cells.
+
+    groups: (rings + 1) first group of each ring. first: (rings) index of each ring's macro-cell at north; clockwise
+    from there they are counted on. until: (cells) stripe after each macro-cell's last. rows, cells: (cells) azimuth
+    rows and radar cells.
+    """
+
+    stripe_rows: int
+    groups: NDArray[np.uint64]
+    first: NDArray[np.uint64]
+    until: NDArray[np.int64]
+    rows: NDArray[np.float64]
+    cells: NDArray[np.float64]
+
+    @classmethod
+    def build(cls, video: VideoFormat, size_m: float) -> MacroCells:
+        """Macro-cells of about size_m by size_m metres."""
+        all_groups = -(-video.ranges // 8)
+        depth = max(1, round(size_m / video.range_step_m / 8))
+        rings = max(1, round(all_groups / depth))
+        groups = np.array([*(np.arange(rings) * depth), all_groups])
+        edges = np.minimum(8 * groups, video.ranges)
+        middle = video.first_range_m + video.range_step_m * (edges[:-1] + edges[1:] - 1) / 2
+        wanted = np.maximum(2 * np.pi * middle / size_m, 1.0)
+        stripe_rows = int(np.clip(video.azimuths / wanted.max() / 2, 1, STRIPE_ROWS))
+        stripes = -(-video.azimuths // stripe_rows)
+        bands = np.clip(np.rint(wanted), 1, stripes).astype(np.int64)
+        until = [(np.arange(n) + 1) * stripes // n for n in bands]
+        rows = [np.diff(np.minimum(one * stripe_rows, video.azimuths), prepend=0) for one in until]
+        return cls(
+            stripe_rows,
+            groups.astype(np.uint64),
+            np.concatenate([[0], np.cumsum(bands)[:-1]]).astype(np.uint64),
+            np.concatenate(until).astype(np.int64),
+            np.concatenate(rows).astype(np.float64),
+            np.concatenate([one * w for one, w in zip(rows, np.diff(edges), strict=True)]).astype(np.float64),
+        )
+
+
+@dataclass(eq=False, kw_only=True)
+class HybridState(ArrayState):
+    """level, weight: log mean in steps and scans behind it, of each macro-cell. The rest is the macro-cells being
+    swept."""
+
+    cells: MacroCells
+    azimuths: int
+    offset_steps: float
+    loss_steps: float
+    tail: NDArray[np.uint8]
+    level: NDArray[np.float64] = remembered()
+    weight: NDArray[np.float64] = remembered()
+    threshold: NDArray[np.uint8] = remembered()
+    pair_sums: NDArray[np.uint16] = remembered()
+    ring_sums: NDArray[np.int64] = remembered()
+    ring_rows: NDArray[np.int64] = remembered()
+    ring_pending: NDArray[np.int64] = remembered()
+    ring_cell: NDArray[np.uint64] = remembered()
+    cursor: NDArray[np.int64] = remembered()
+    budget: NDArray[np.float64] = remembered()
+    degraded_sweeps: NDArray[np.int64] = remembered()
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """degraded_sweeps: sweeps whose threshold was raised to stay under the cap on runs."""
+        return {"degraded_sweeps": int(self.degraded_sweeps[0])}
+
+
+@dataclass(frozen=True)
+class Hybrid:
+    """A cell is detected when its log amplitude exceeds its macro-cell's remembered log mean by a constant.
+
+    pfa: false alarm probability in Rayleigh clutter, held including the 8-bit rounding and the error of the mean
+    itself. macro_cell_m: side of the (nearly square) macro-cells. memory: scans of the recursive mean (feedback 1 -
+    1/memory); until then it is the plain mean of the scans seen. learn_scans: scans before a macro-cell detects
+    anything: with 1, the first scan only learns and scan 2 detects with the full Pd. max_runs: cap on runs of detected
+    cells a turn; above it the rows concerned get a higher threshold, just as high as needed (`Detections.degraded`,
+    counted). A macro-cell within the offset of full scale detects nothing; without any echo (level 0) the offset alone
+    is the threshold.
+    """
+
+    pfa: float = 1e-6
+    macro_cell_m: float = 100.0
+    memory: int = 64
+    learn_scans: int = 1
+    max_runs: int = 40_000
+
+    def __post_init__(self) -> None:
+        if not 0 < self.pfa < 0.5:
+            raise ValueError("pfa must lie between 0 and 0.5")
+        if not self.macro_cell_m > 0:
+            raise ValueError("macro_cell_m must be greater than 0")
+        if self.memory < 1 or self.learn_scans < 1 or self.max_runs < 1:
+            raise ValueError("memory, learn_scans and max_runs must be 1 or more")
+
+    def start(self, video: VideoFormat, surface: NDArray[np.uint8] | None = None) -> HybridState:
+        """The state before the first sweep. surface is not used: the macro-cells are squares."""
+        if surface is not None and surface.shape != (video.azimuths, video.ranges):
+            raise ValueError(f"surface must be ({video.azimuths}, {video.ranges}), not {surface.shape}")
+        cells = MacroCells.build(video, self.macro_cell_m)
+        rings, many = len(cells.first), len(cells.rows)
+        independent = min(1.0, video.azimuth_step_rad / video.beamwidth_rad)
+        return HybridState(
+            cells=cells,
+            azimuths=video.azimuths,
+            offset_steps=threshold_offset_db(self.pfa, video.db_per_step) / video.db_per_step,
+            loss_steps=estimation_loss_db(self.pfa, video.db_per_step) / video.db_per_step / independent,
+            tail=np.zeros(64, np.uint8),
+            level=np.zeros(many),
+            weight=np.zeros(many),
+            threshold=np.full(64 * video.words, 255, np.uint8),
+            pair_sums=np.zeros(32 * video.words, np.uint16),
+            ring_sums=np.zeros(rings, np.int64),
+            ring_rows=np.zeros(rings, np.int64),
+            ring_pending=np.zeros(rings, np.int64),
+            ring_cell=cells.first.copy(),
+            cursor=np.array([-1, 0, -1], np.int64),
+            budget=np.array([CapSettings.of(self.max_runs, video.azimuths).depth]),
+            degraded_sweeps=np.zeros(1, np.int64),
+        )
+
+    def __call__(self, sweeps: Sweeps, state: HybridState) -> Detections:
+        """The detections of the block."""
+        ranges = sweeps.amplitude.shape[1]
+        mask = np.empty((len(sweeps), (ranges + 63) // 64), np.uint64)
+        before = int(state.degraded_sweeps[0])
+        cap = CapSettings.of(self.max_runs, state.azimuths)
+        cells = state.cells
+        _detect(
+            read_only(sweeps.amplitude),
+            read_only(sweeps.row, np.int64),
+            sweeps.scan,
+            mask,
+            cells.stripe_rows,
+            (cells.groups, cells.first, cells.until, cells.cells, cells.rows),
+            (state.offset_steps, state.loss_steps, float(self.memory), self.learn_scans - 0.5),
+            (cap.refill, cap.depth),
+            (state.level, state.weight, state.threshold.view(np.uint64), state.pair_sums.view(np.uint64)),
+            (
+                state.ring_sums,
+                state.ring_rows,
+                state.ring_pending,
+                state.ring_cell,
+                state.cursor,
+            ),
+            (state.budget, state.degraded_sweeps),
+            state.tail,
+        )
+        return Detections(mask, degraded=int(state.degraded_sweeps[0]) > before)
+
+
+PART = Hybrid
+
+
+@njit(nogil=True, cache=True)
+def _detect(
+    amplitude: Any,
+    rows: Any,
+    scan: int,
+    mask: Any,
+    stripe_rows: int,
+    layout: Any,
+    rule: Any,
+    cap: Any,
+    memory: Any,
+    swept: Any,
+    flood: Any,
+    tail: Any,
+) -> None:
+    refill, depth = cap
+    threshold, pair_sums = memory[2], memory[3]
+    cursor = swept[4]
+    budget, degraded = flood
+    n, ranges = amplitude.shape
+    whole = ranges // 64
+    rest = ranges - 64 * whole
+    cells_at, limits_at, sums_at, tail_at = (
+        amplitude.ctypes.data,
+        threshold.ctypes.data,
+        pair_sums.ctypes.data,
+        tail.ctypes.data,
+    )
+    for i in range(n):
+        stripe = rows[i] // stripe_rows
+        if stripe != cursor[0] or scan != cursor[2]:
+            _next_stripe(stripe, scan, layout, rule, memory, swept)
+        cursor[1] += 1
+        bits = mask[i]
+        row_at = cells_at + np.uintp(i) * np.uintp(ranges)
+        anything = np.uint64(0)
+        for w in range(whole):
+            at = np.uintp(64 * w)
+            word = bits_above(row_at + at, limits_at + at)
+            add_pairs(row_at + at, sums_at + at)
+            bits[w] = word
+            anything |= word
+        if rest:
+            cells = amplitude[i]
+            for j in range(rest):
+                tail[j] = cells[64 * whole + j]
+            at = np.uintp(64 * whole)
+            word = bits_above(tail_at, limits_at + at)
+            add_pairs(tail_at, sums_at + at)
+            bits[whole] = word
+            anything |= word
+        budget[0] = min(budget[0] + refill, depth)
+        if anything:
+            degraded[0] += fit_row(amplitude[i], limits_at, bits, budget, tail)
+
+
+@njit(nogil=True, cache=True)
+def _next_stripe(stripe: int, scan: int, layout: Any, rule: Any, memory: Any, swept: Any) -> None:
+    # One function with plain loops over eight bytes at a time: a call that hands on arrays, or a loop whose length the
+    # compiler does not know, costs more here than the work itself.
+    groups, first_cell, until, full_cells, full_rows = layout
+    mu, loss, most, learn = rule
+    level, weight, threshold, pair_sums = memory
+    sums, rows, pending, current, cursor = swept
+    new_scan = scan != cursor[2]
+    even = np.uint64(0x0000FFFF0000FFFF)
+    for k in range(first_cell.size):
+        pending[k] += cursor[1]
+        old = current[k]
+        leaves = new_scan or stripe >= until[old]
+        if not leaves and pending[k] <= PAIR_ROWS - STRIPE_ROWS:
+            continue
+        low, high = np.uint64(0), np.uint64(0)
+        for g in range(groups[k], groups[k + 1]):
+            four = pair_sums[g]
+            low += four & even
+            high += (four >> np.uint64(16)) & even
+            pair_sums[g] = 0
+        low += high
+        sums[k] += np.int64((low & np.uint64(0xFFFFFFFF)) + (low >> np.uint64(32)))
+        rows[k] += pending[k]
+        pending[k] = 0
+        if not leaves:
+            continue
+        if rows[k] > 0:
+            share = rows[k] / full_rows[old]
+            weight[old] = min(weight[old] + share, most)
+            level[old] += (sums[k] / (share * full_cells[old]) - level[old]) * share / weight[old]
+        sums[k] = 0
+        rows[k] = 0
+        new = first_cell[k] if new_scan else old
+        while stripe >= until[new]:
+            new += np.uint64(1)
+        current[k] = new
+        limit = 255.0
+        if weight[new] >= learn:
+            limit = min(np.floor(level[new] + mu + loss / (weight[new] * full_cells[new]) + 0.5), 255.0)
+        eight = np.uint64(limit) * np.uint64(0x0101010101010101)
+        for g in range(groups[k], groups[k + 1]):
+            threshold[g] = eight
+    cursor[0] = stripe
+    cursor[1] = 0
+    cursor[2] = scan

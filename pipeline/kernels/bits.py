@@ -1,0 +1,101 @@
+"""Sixty-four cells at a time: compare bytes to a bit mask, add bytes up, count and find bits.
+
+Plain LLVM vector instructions, so every processor that LLVM knows has them (AVX-512, AVX2, NEON, ...). The functions
+that take addresses read and write exactly the bytes named; the caller keeps the arrays alive and in bounds.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import extending, njit, types
+
+_BYTES = ir.VectorType(ir.IntType(8), 64)
+intrinsic: Any = extending.intrinsic
+_PAIRS = ir.VectorType(ir.IntType(16), 32)
+
+
+def _load(builder: Any, address: Any, kind: ir.Type) -> Any:
+    value = builder.load(builder.inttoptr(address, kind.as_pointer()))
+    value.align = 1
+    return value
+
+
+@intrinsic
+def bits_above(typing: Any, cells: Any, limits: Any) -> Any:
+    """Bit j is set when byte j of the 64 at address `cells` is greater than byte j at address `limits`."""
+
+    def build(context: Any, builder: Any, signature: Any, words: Any) -> Any:
+        x, limit = (_load(builder, one, _BYTES) for one in words)
+        return builder.bitcast(builder.icmp_unsigned(">", x, limit), ir.IntType(64))
+
+    return types.uint64(types.uintp, types.uintp), build
+
+
+@intrinsic
+def bits_above_raised(typing: Any, cells: Any, limits: Any, raised: Any) -> Any:
+    """As bits_above, with `raised` added to every limit (a limit past 255 stays 255, which nothing exceeds)."""
+
+    def build(context: Any, builder: Any, signature: Any, words: Any) -> Any:
+        x, limit = (_load(builder, one, _BYTES) for one in words[:2])
+        step = builder.trunc(words[2], ir.IntType(8))
+        first = builder.insert_element(ir.Constant(_BYTES, ir.Undefined), step, ir.Constant(ir.IntType(32), 0))
+        everywhere = builder.shuffle_vector(
+            first, ir.Constant(_BYTES, ir.Undefined), ir.Constant(ir.VectorType(ir.IntType(32), 64), [0] * 64)
+        )
+        total = builder.add(limit, everywhere)
+        past = builder.icmp_unsigned("<", total, everywhere)
+        high = builder.select(past, ir.Constant(_BYTES, [255] * 64), total)
+        return builder.bitcast(builder.icmp_unsigned(">", x, high), ir.IntType(64))
+
+    return types.uint64(types.uintp, types.uintp, types.uint64), build
+
+
+@intrinsic
+def add_pairs(typing: Any, cells: Any, sums: Any) -> Any:
+    """Add the 64 bytes at address `cells`, two neighbours together, to the 32 uint16 at address `sums` (128 times at
+    most)."""
+
+    def build(context: Any, builder: Any, signature: Any, words: Any) -> Any:
+        pairs = _load(builder, words[0], _PAIRS)
+        low = builder.and_(pairs, ir.Constant(_PAIRS, [0xFF] * 32))
+        high = builder.lshr(pairs, ir.Constant(_PAIRS, [8] * 32))
+        total = builder.add(_load(builder, words[1], _PAIRS), builder.add(low, high))
+        builder.store(total, builder.inttoptr(words[1], _PAIRS.as_pointer()), align=2)
+        return context.get_dummy_value()
+
+    return types.void(types.uintp, types.uintp), build
+
+
+@intrinsic
+def trailing_zeros(typing: Any, word: Any) -> Any:
+    """Position of the lowest set bit; 64 for an empty word."""
+
+    def build(context: Any, builder: Any, signature: Any, words: Any) -> Any:
+        return builder.cttz(words[0], ir.Constant(ir.IntType(1), 0))
+
+    return types.uint64(types.uint64), build
+
+
+@intrinsic
+def set_bits(typing: Any, word: Any) -> Any:
+    """How many bits are set."""
+
+    def build(context: Any, builder: Any, signature: Any, words: Any) -> Any:
+        return builder.ctpop(words[0])
+
+    return types.uint64(types.uint64), build
+
+
+@njit(nogil=True, cache=True)
+def count_runs(mask: Any) -> Any:
+    """Number of runs of set bits in one row of words."""
+    runs: Any = 0
+    carry = types.uint64(0)
+    one = types.uint64(1)
+    for w in range(mask.size):
+        word = mask[w]
+        runs += set_bits(word & ~((word << one) | carry))
+        carry = word >> types.uint64(63)
+    return runs

@@ -1,0 +1,180 @@
+"""The chain of one radar: order, gaps, late blocks, restart, the picture of the newest turn."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from pipeline.chain import RadarChain
+from pipeline.detect.hybrid import Hybrid
+from pipeline.extract.manhattan import Manhattan
+from pipeline.state import StateError
+from pipeline.tables import Plots, SectorPlots, Sweeps, TableError
+from tests.frontend.contracts import assert_same_plots, busy_video
+from tests.frontend.scenes import SMALL, cut, site, strip
+
+EIGHTHS = range(0, 96, 12)
+
+
+def chain(**setting: int) -> RadarChain:
+    return RadarChain(site(), 3, Hybrid(**setting), Manhattan())
+
+
+def blocks(scans: int = 4) -> list[Sweeps]:
+    return [one for block in strip(busy_video(SMALL, scans), SMALL) for one in cut(block, EIGHTHS)]
+
+
+def run(target: RadarChain, these: list[Sweeps]) -> list[SectorPlots]:
+    return [target.process(one) for one in these]
+
+
+def plots_of(sectors: list[SectorPlots]) -> Plots:
+    return Plots.concatenate([one.plots for one in sectors])
+
+
+def test_sectors_join_without_gap_and_plots_lie_in_what_was_open() -> None:
+    sectors = run(chain(), blocks())
+    assert sectors[0].closed_from == 0
+    for before, after in itertools.pairwise(sectors):
+        assert after.closed_from == before.closed_to
+    for one in sectors:
+        row = one.plots.scan * SMALL.azimuths + one.plots.azimuth / SMALL.azimuth_step_rad
+        assert (row >= one.closed_from - 1e-6).all()
+    plots = plots_of(sectors)
+    assert (plots.radar == 3).all()
+    assert set(plots.scan) == {1, 2, 3}
+    # four targets a scan; the first of them lies across north and belongs to the scan of its centre
+    assert (np.bincount(plots[plots.cells > 8].scan)[1:3] == 4).all()
+    assert (np.diff(plots.time) > -0.2).all()
+
+
+def test_block_size_does_not_matter() -> None:
+    whole, small = chain(), chain()
+    a = plots_of([*run(whole, strip(busy_video(SMALL, 4), SMALL)), whole.flush()])
+    b = plots_of([*run(small, blocks()), small.flush()])
+    assert_same_plots(a, b)
+
+
+def test_late_sweeps_are_refused_and_counted() -> None:
+    these = blocks()
+    target = chain()
+    run(target, these[:20])
+    before = target.newest.copy()
+    again = target.process(these[18])
+    assert len(again.plots) == 0
+    assert again.closed_from == again.closed_to
+    np.testing.assert_array_equal(target.newest, before)
+    assert target.counters["late_blocks"] == 1
+    assert target.counters["late_sweeps"] == 12
+    scan = strip(busy_video(SMALL, 4), SMALL)[2]
+    target.process(scan)  # its first 48 rows were worked on
+    assert target.counters["late_sweeps"] == 12 + 48
+    assert target.counters["sweeps"] == 20 * 12 + 48
+
+
+def test_gaps_are_counted_and_shown_as_nothing() -> None:
+    these = blocks(6)
+    target = chain()
+    run(target, these[:12] + these[14:20])
+    assert target.counters["missing_sweeps"] == 24
+    assert not target.newest[48:72].any()
+    assert target.newest[:48].any(axis=1).all()
+    target.process(these[-8])  # two scans later
+    assert target.newest[:12].any()
+    assert not target.newest[12:].any()
+    assert target.counters["missing_sweeps"] == 24 + 20 * 12
+    assert target.process(these[-7]).degraded is False
+
+
+def test_newest_is_the_newest_turn_in_place() -> None:
+    target = chain()
+    kept = target.newest
+    frames = busy_video(SMALL, 3)
+    run(target, strip(frames, SMALL))
+    assert target.newest is kept
+    np.testing.assert_array_equal(kept, frames[2])
+
+
+def test_a_restart_goes_on_where_it_was() -> None:
+    these = blocks()
+    straight = chain()
+    wanted = plots_of([*run(straight, these), straight.flush()])
+    first = chain()
+    begun = run(first, these[:15])
+    second = chain()
+    second.restore(first.save())
+    assert_same_plots(wanted, plots_of([*begun, *run(second, these[15:]), second.flush()]))
+
+
+def test_a_state_of_other_parts_or_formats_is_refused() -> None:
+    saved = chain().save()
+    with pytest.raises(StateError, match=r"no 'chain\.rows'"):
+        chain().restore({k: v for k, v in saved.items() if k != "chain.rows"})
+    with pytest.raises(StateError, match="belongs to"):
+        chain().restore({**saved, "chain.parts": np.array(["Other", "Manhattan"])})
+    with pytest.raises(StateError, match="no 'level'"):
+        chain().restore({k: v for k, v in saved.items() if k != "detect.level"})
+
+
+def test_a_flood_is_seen() -> None:
+    rng = np.random.default_rng(1)
+    frames = busy_video(SMALL, 4)
+    frames[2] = rng.integers(0, 256, frames[2].shape, dtype=np.uint8)
+    target = chain(max_runs=200)
+    sectors = run(target, strip(frames, SMALL))
+    assert [one.degraded for one in sectors] == [False, False, True, False]
+    assert target.counters["degraded_blocks"] == 1
+    assert target.counters["degraded_sweeps"] > 1
+    assert len(sectors[3].plots) > 0
+
+
+def test_what_does_not_fit_is_refused_and_changes_nothing() -> None:
+    these = blocks()
+    target = chain()
+    run(target, these[:3])
+    good = these[3]
+    nan_time = good.time.copy()
+    nan_time[2] = np.nan
+    for bad in (
+        Sweeps(0, 0, good.row, good.azimuth, good.time, good.amplitude[:, :100]),
+        Sweeps(0, 0, good.row + 90, good.azimuth, good.time, good.amplitude),
+        Sweeps(0, -1, good.row, good.azimuth, good.time, good.amplitude),
+        Sweeps(0, 0, good.row, good.azimuth, nan_time, good.amplitude),
+    ):
+        with pytest.raises(TableError):
+            target.process(bad)
+    assert target.counters["sweeps"] == 36
+    assert_same_plots(plots_of(run(target, these[3:])), plots_of(run(chain(), these)))
+
+
+def test_an_empty_block_is_nothing() -> None:
+    target = chain()
+    empty = blocks()[0]
+    nothing = Sweeps(0, 0, empty.row[:0], empty.azimuth[:0], empty.time[:0], empty.amplitude[:0], last=True)
+    assert len(target.process(nothing).plots) == 0
+    assert target.counters["blocks"] == 0
+
+
+def test_stages_are_timed_with_the_clock_that_is_given() -> None:
+    ticks = itertools.count()
+    target = RadarChain(site(), 0, Hybrid(), Manhattan(), clock=lambda: float(next(ticks)))
+    target.process(blocks()[0])
+    assert target.timings == {"keep": 1.0, "detect": 1.0, "extract": 1.0}
+
+
+def test_warming_compiles_everything_and_leaves_the_chain_alone() -> None:
+    from pipeline.detect.hybrid import _detect
+    from pipeline.kernels.components import _take_rows
+
+    target = chain()
+    before = target.save()
+    target.warm()
+    for name, array in target.save().items():
+        np.testing.assert_array_equal(array, before[name])
+    compiled = len(_detect.signatures), len(_take_rows.signatures)
+    these = blocks()
+    these[3].amplitude.flags.writeable = False
+    run(target, these)
+    assert (len(_detect.signatures), len(_take_rows.signatures)) == compiled

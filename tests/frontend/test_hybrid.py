@@ -1,0 +1,153 @@
+"""The hybrid detector against its text, its calibration and its twin."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from pipeline.detect import Detector
+from pipeline.detect.calibration import false_alarm_probability, threshold_offset_db
+from pipeline.detect.hybrid import Hybrid, MacroCells
+from pipeline.parts import PartError, build
+from pipeline.tables import VideoFormat
+from tests.frontend.contracts import DetectorContract, busy_video, mask_of
+from tests.frontend.naive import hybrid_masks
+from tests.frontend.scenes import SMALL, cut, rayleigh, strip
+
+
+class TestHybridKeepsTheContract(DetectorContract):
+    def make(self, **setting: Any) -> Detector:
+        part: Detector = build("detect", "hybrid", setting)
+        return part
+
+
+@pytest.mark.parametrize(("azimuths", "ranges"), [(96, 150), (250, 77), (400, 256)])
+@pytest.mark.parametrize("lost", [0.0, 0.4])
+def test_equal_to_the_obvious_twin(azimuths: int, ranges: int, lost: float) -> None:
+    video = VideoFormat(azimuths=azimuths, ranges=ranges, range_step_m=6.0, beamwidth_rad=0.1)
+    part = Hybrid(pfa=1e-3, memory=3)
+    keep = np.random.default_rng(2).random((7, azimuths)) >= lost
+    keep[4] = False
+    blocks = [one for one in strip(busy_video(video, 7), video, keep) if len(one)]
+    state = part.start(video)
+    for block, wanted in zip(blocks, hybrid_masks(part, blocks, video, state), strict=True):
+        np.testing.assert_array_equal(part(block, state).cells(ranges), wanted)
+
+
+def test_macro_cells_are_about_a_hundred_metres() -> None:
+    video = VideoFormat()
+    grid = MacroCells.build(video, 100.0)
+    depth = np.diff(np.minimum(grid.groups.astype(float) * 8, video.ranges)) * video.range_step_m
+    assert ((depth > 60) & (depth < 140)).all()
+    for k in range(1, len(grid.first) - 1):
+        cells = slice(int(grid.first[k]), int(grid.first[k + 1]))
+        radius = video.range_step_m * 4 * float(grid.groups[k] + grid.groups[k + 1])
+        across = grid.rows[cells] * video.azimuth_step_rad * radius
+        assert 70 < across.mean() < 130
+        assert grid.rows[cells].sum() == video.azimuths
+    assert (grid.cells >= 256).all()
+
+
+def test_calibration_by_the_formula() -> None:
+    assert threshold_offset_db(1e-6, 0.3125) == pytest.approx(13.76, abs=0.02)
+    assert threshold_offset_db(1e-6, 1e-6) == pytest.approx(10 * np.log10(-np.log(1e-6)) + 2.507, abs=1e-3)
+    for pfa in (1e-2, 1e-4, 1e-6, 1e-8):
+        for step in (0.05, 0.3125, 1.5, 4.0):
+            assert false_alarm_probability(threshold_offset_db(pfa, step), step) == pytest.approx(pfa, rel=1e-4)
+
+
+def test_offset_in_use_is_near_the_published_13_83_db() -> None:
+    state = Hybrid().start(VideoFormat())
+    late = state.offset_steps + state.loss_steps / (64 * state.cells.cells)
+    early = state.offset_steps + state.loss_steps / state.cells.cells
+    assert np.abs(late * 0.3125 - 13.83).max() < 0.1
+    assert np.abs(early * 0.3125 - 13.83).max() < 0.25
+
+
+def test_false_alarms_are_what_was_asked_at_1e_4() -> None:
+    video = VideoFormat(azimuths=512, ranges=512, beamwidth_rad=0.01)
+    part = Hybrid(pfa=1e-4)
+    state = part.start(video)
+    rng = np.random.default_rng(20)
+    # the level drifts over one step, so that the rounding of the threshold is met at all its fractions
+    frames = np.stack([rayleigh(rng, (512, 512), 25.0 + 0.3125 * k / 12) for k in range(12)])
+    alarms = sum(int(np.bitwise_count(part(block, state).mask).sum()) for block in strip(frames, video))
+    cells = 11 * 512 * 512
+    assert binom.cdf(alarms, cells, 0.8e-4) > 0.001
+    assert binom.sf(alarms, cells, 1.2e-4) > 0.001
+
+
+def test_false_alarms_are_what_was_asked_at_1e_6_given_the_thresholds() -> None:
+    """Semi-analytic: thresholds as the detector sets them, the tail of the rounded Rayleigh amplitude exactly."""
+    video = VideoFormat(azimuths=1024, ranges=512, beamwidth_rad=0.005)
+    part = Hybrid()
+    state = part.start(video)
+    rng = np.random.default_rng(21)
+    mean_db = 25.0 + np.linspace(0, 3.125, 512)  # ten steps over the range cells: all fractions of a step
+    power = mean_db + 10 * np.log10(rng.exponential(size=(1024, 512)))
+    frame = np.clip(np.rint(power / 0.3125), 0, 255).astype(np.uint8)
+    learnt, after = strip(np.stack([frame, frame]), video)
+    part(learnt, state)
+    part(next(cut(after, (1,))), state)  # the first sweep of the next scan closes the last macro-cells
+    ring = np.searchsorted(state.cells.first, np.arange(len(state.level)), side="right") - 1
+    limit = np.floor(state.level + state.offset_steps + state.loss_steps / state.cells.cells + 0.5)
+    chance = np.zeros(len(state.level))
+    for cell, k in enumerate(ring):
+        inside = mean_db[int(state.cells.groups[k]) * 8 : int(state.cells.groups[k + 1]) * 8]
+        chance[cell] = np.exp(-(10 ** (((limit[cell] + 0.5) * 0.3125 - inside) / 10))).mean()
+    # the ramp inside a macro-cell (0.2 dB) is the only thing that is not as calibrated; it costs a few per cent
+    assert 0.6e-6 < np.average(chance, weights=state.cells.cells) < 1.6e-6
+
+
+def swerling3(rng: np.random.Generator, n: int) -> Any:
+    return rng.gamma(2.0, 0.5, n)
+
+
+def test_detection_of_a_swerling_3_target_at_20_5_db() -> None:
+    """Galati et al., table I, first scan: 94 %; with the signal referred to the log mean 92 to 94 %."""
+    video = VideoFormat(azimuths=512, ranges=512, beamwidth_rad=0.01)
+    part = Hybrid()
+    state = part.start(video)
+    rng = np.random.default_rng(22)
+    frames = rayleigh(rng, (3, 512, 512), 25.0)
+    i, j = (one.ravel() for one in np.meshgrid(np.arange(4, 512, 16), np.arange(4, 512, 16), indexing="ij"))
+    voltage = np.sqrt(swerling3(rng, i.size) * 10 ** ((25.0 - 2.507 + 20.5) / 10))
+    noise = np.sqrt(10**2.5 / 2) * (rng.normal(size=i.size) + 1j * rng.normal(size=i.size))
+    level = 10 * np.log10(np.abs(voltage + noise) ** 2)
+    frames[1, i, j] = np.clip(np.rint(level / 0.3125), 0, 255)
+    blocks = strip(frames, video)
+    part(blocks[0], state)
+    found = part(blocks[1], state).cells(512)[i, j]
+    # 1,024 targets: three standard deviations of the estimate are 2.5 points
+    assert 0.895 <= found.mean() <= 0.965
+
+
+def test_a_target_is_not_in_its_own_first_threshold() -> None:
+    part = Hybrid()
+    frames = np.full((3, 96, 150), 60, np.uint8)
+    frames[1, 20:60, 50:120] = 150  # as large as several macro-cells
+    mask, _ = mask_of(part, strip(frames, SMALL), part.start(SMALL))
+    assert np.bitwise_count(mask[96:192]).sum() == 40 * 70
+
+
+def test_the_first_scan_only_learns() -> None:
+    part = Hybrid()
+    mask, _ = mask_of(part, strip(busy_video(SMALL, 2), SMALL), part.start(SMALL))
+    assert not mask[:96].any()
+    assert mask[96:].any()
+
+
+@pytest.mark.parametrize(
+    "setting", [{"pfa": 0.0}, {"pfa": 1.0}, {"memory": 0}, {"macro_cell_m": -1.0}, {"max_runs": 0}]
+)
+def test_wrong_settings_are_refused(setting: dict[str, Any]) -> None:
+    with pytest.raises(PartError):
+        build("detect", "hybrid", setting)
+
+
+def test_a_surface_of_another_shape_is_refused() -> None:
+    with pytest.raises(ValueError, match="surface"):
+        Hybrid().start(SMALL, np.zeros((3, 3), np.uint8))
