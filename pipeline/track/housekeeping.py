@@ -6,8 +6,10 @@ import numpy as np
 from numba import njit
 
 from pipeline.tables import TrackPhase
-from pipeline.track.contracts import Array, Floats
+from pipeline.track.contracts import Array, Expected, Floats
 from pipeline.track.core import Core, end, judge, strip_identity
+from pipeline.track.radar_update import owners
+from pipeline.track.table import NEVER
 
 JUDGE_EVERY = 0.12
 """Seconds between two looks at all tracks; less than any radar needs to come round."""
@@ -30,6 +32,7 @@ def keep_house(core: Core) -> None:
     core.count("identity_stale", len(stale))
     strip_identity(core, stale)
     _merge_doubles(core)
+    _end_parts(core)
 
 
 def _merge_doubles(core: Core) -> None:
@@ -55,6 +58,27 @@ def _merge_doubles(core: Core) -> None:
             _absorb(core, int(senior), int(alive[junior]))
             gone[alive[junior]] = True
     core.count("merged", int(gone.sum()))
+    end(core, gone)
+
+
+def _end_parts(core: Core) -> None:
+    """Tentative tracks by radar alone inside the extent of an established track are parts of its echo."""
+    table, n = core.table, core.table.n
+    young = np.flatnonzero((table.phase[:n] == TrackPhase.TENTATIVE) & (table.shapes[:n] > 0))
+    young = young[np.maximum(table.node_time[young], table.report_time[young]) == NEVER]
+    old = np.flatnonzero(table.phase[:n] == TrackPhase.CONFIRMED)
+    if not len(young) or not len(old):
+        return
+    size = core.extents()
+    known = Expected(
+        table.time[old], table.state[old], table.covariance[old], np.zeros(len(old)), size[old], np.zeros(len(old))
+    )
+    owner = owners(
+        core, old, known, table.time[young], table.state[young, :2], table.covariance[young, :2, :2], size[young]
+    )
+    gone = np.zeros(n, np.bool_)
+    gone[young[owner >= 0]] = True
+    core.count("absorbed_tracks", int(gone.sum()))
     end(core, gone)
 
 

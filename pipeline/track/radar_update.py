@@ -129,7 +129,7 @@ def _decide(core: Core, sector: SectorPlots, plots: Plots, plot_rows: Array) -> 
     used[taken[taken >= 0]] = True
     wait = ~used & (contested | (plot_rows >= sector.closed_to))
     left = np.flatnonzero(~used & ~wait)
-    owner = _owners(core, near, expected, plots.time[left], position[left], shape[left])
+    owner = owners(core, near, expected, plots.time[left], position[left], noise[left], shape[left])
     core.count("absorbed", int((owner >= 0).sum()))
     owning = np.full(len(left), -1, np.int64)
     owning[owner >= 0] = near[owner[owner >= 0]]
@@ -142,13 +142,22 @@ def _decide(core: Core, sector: SectorPlots, plots: Plots, plot_rows: Array) -> 
     return wait
 
 
-def _owners(core: Core, near: Array, expected: Expected, time: Floats, position: Floats, shape: Floats) -> Array:
-    """For each leftover plot the established track (index in `near`) within whose extent it lies, -1 for none."""
+def owners(
+    core: Core, near: Array, expected: Expected, time: Floats, position: Floats, noise: Floats, shape: Floats
+) -> Array:
+    """For each leftover plot the established track (index in `near`) within whose extent it lies, -1 for none.
+
+    The extent is wider by the margin of the settings, and for long targets by what plot and track are unsure of.
+    """
     made = np.full(len(time), -1, np.int64)
     settled = (core.table.phase[near] != TrackPhase.TENTATIVE) & (core.table.shapes[near] >= SETTLED)
     if len(time) and settled.any():
         margin = core.settings.absorb_margin
-        _inside(expected.time, expected.state, expected.extent, settled, time, position, shape, margin, made)
+        unsure = np.trace(expected.covariance[:, :2, :2], axis1=1, axis2=2)
+        slack = np.trace(noise, axis1=1, axis2=2)
+        _inside(
+            expected.time, expected.state, expected.extent, unsure, settled, time, position, slack, shape, margin, made
+        )  # fmt: skip
     return made
 
 
@@ -232,8 +241,8 @@ def _begin(core: Core, sector: SectorPlots, plots: Plots, plot_rows: Array, posi
 
 @njit(nogil=True, cache=True)
 def _inside(
-    track_time: Floats, state: Floats, extent: Floats, settled: Array, time: Floats, position: Floats, shape: Floats,
-    margin: float, owner: Array,
+    track_time: Floats, state: Floats, extent: Floats, unsure: Floats, settled: Array, time: Floats, position: Floats,
+    slack: Floats, shape: Floats, least: float, owner: Array,
 ) -> None:  # fmt: skip
     for j in range(len(time)):
         best = 1.0
@@ -243,7 +252,7 @@ def _inside(
             dt = time[j] - track_time[i]
             e = position[j, 0] - state[i, 0] - dt * state[i, 2]
             n = position[j, 1] - state[i, 1] - dt * state[i, 3]
-            # the centroid of a part lies inside the whole by half of the part's own extent, so no more than the margin
+            margin = min(max(least, math.sqrt(2.0 * (unsure[i] + slack[j]))), least + 0.1 * extent[i, 0])
             a, b = 0.5 * extent[i, 0] + margin, 0.5 * extent[i, 1] + margin
             if e * e + n * n > max(a, b) ** 2 or shape[j, 0] > 1.2 * extent[i, 0] + margin:
                 continue
