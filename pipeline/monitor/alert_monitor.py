@@ -221,8 +221,10 @@ class AlertMonitor:
 
     def _serious(self, s: Situation, row: int, entry: Entry) -> bool:
         runway = int(self._hold_frames.runway[entry.hold])
-        if s.depth[runway, row] > 0:
+        if s.depth[runway, row] > 0 or s.entering[runway, row]:
             return True
+        if not entry.node:
+            return False
         soon = s.position[row] + s.velocity[row] * self._entry.soon_s
         return bool(self._frames.depth(runway, s.runways[runway].visibility, soon[None, :])[0] > 0)
 

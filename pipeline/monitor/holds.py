@@ -19,8 +19,9 @@ class HoldSettings:
 
     node_radius_m, node_speed: a node event belongs to the nearest track within this of the bar, moving towards the
     runway at least this fast (m/s). node_wait_s: an event waits so long for its track. reach_s: an entry that has not
-    come into the protection area after so long is forgotten. soon_s: an entry counts when the track is in the area, or
-    will be after so long: behind a holding position far out there may be other ways to go.
+    come into the protection area after so long is forgotten. soon_s: an entry counts when the track is in the area or
+    cannot stop before it, and one that a node felt also when it will be in after so long. Behind a holding position
+    far out there may be another one, or other ways to go.
     """
 
     step_m: float = 4.0
@@ -29,7 +30,7 @@ class HoldSettings:
     node_speed: float = 1.5
     node_wait_s: float = 3.0
     reach_s: float = 30.0
-    soon_s: float = 5.0
+    soon_s: float = 3.0
 
 
 @dataclass

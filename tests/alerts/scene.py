@@ -37,7 +37,13 @@ def small_airport() -> Airport:
         box(-1500, -22.5, 1500, 22.5),
         {"normal": box(-1600, -90, 1600, 90), "low": box(-1600, -150, 1600, 150)},
     )
-    holds = (hold("A1", -1450, -90, 0.0), hold("B1", 0, -90, 0.0), hold("N1", 0, 90, np.pi), hold("E1", 1400, -90, 0.0))
+    holds = (
+        hold("A1", -1450, -90, 0.0),
+        hold("B1", 0, -90, 0.0),
+        hold("N1", 0, 90, np.pi),
+        hold("E1", 1400, -90, 0.0),
+        hold("F1", 700, -220, 0.0),
+    )
     return Airport("TEST", "Test", LocalFrame(48.7, 2.4), (runway,), holds, (), TaxiGraph((), ()))
 
 

@@ -92,6 +92,13 @@ def test_leaving_over_a_holding_position_is_nothing() -> None:
     assert play(monitor(), [van], 0, 30).changes == []
 
 
+def test_a_holding_position_far_out_leads_elsewhere_too() -> None:
+    turning = Mover(3, [(0, 700, -300), (20, 700, -205), (60, 300, -190)], TargetClass.VEHICLE)
+    assert play(monitor(), [turning], 0, 60).changes == []
+    onward = Mover(3, [(0, 700, -300), (20, 700, -200), (50, 700, -40), (90, 700, -39)], TargetClass.VEHICLE)
+    assert play(monitor(), [onward], 0, 60).raised("hold_entry")[0].holding_point == "F1"
+
+
 def test_a_pavement_node_makes_the_entry_certain_at_once() -> None:
     nodes = (NodeSite("n1", 0, -90, 0.0, hold="B1"),)
     van = Mover(3, [(0, 0, -200), (22, 0, -90), (32, 0, -40), (100, 0, -40)], TargetClass.VEHICLE, {"hits": 3})
