@@ -67,6 +67,7 @@ export class Display {
   choose(choices) {
     if (this.scene.theme.name !== choices.palette) this.scene.theme = applyTheme(choices.palette);
     this.scene.choices = choices;
+    this.radar.ink = choices.palette === 'day' ? 'blue' : choices.palette === 'contrast' ? 'amber' : 'green';
     this.placedMs = -Infinity;
     if (this.radar.on !== choices.radar || this.radar.opacity !== choices.radarOpacity) this.radar.set(choices.radar, choices.radarOpacity);
     this.stage.invalidate();

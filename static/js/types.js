@@ -53,6 +53,7 @@
  * @property {string|null} holding_point
  * @property {number|null} time_to_threshold_s
  * @property {boolean} aural
+ * @property {boolean} degraded
  * @property {boolean} simulated
  * @property {AlertTarget[]} targets
  */

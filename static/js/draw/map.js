@@ -36,6 +36,8 @@ export class MapLayer {
     this.names = [];
     /** names stand on guidance lines where there are any, else in the middle of the surface */
     this.guided = airport.features.some((one) => one.kind === 'TaxiwayGuidanceLine' && one.name);
+    /** stands that have a place of their own; their lines and areas need not be named again */
+    this.located = new Set(airport.features.filter((one) => one.kind === 'ParkingStandLocation').map((one) => one.name));
     for (const feature of airport.features) this.sort(feature);
     this.names.sort((a, b) => b.weight - a.weight);
   }
@@ -47,7 +49,7 @@ export class MapLayer {
       this.holds.push(feature);
     } else if (/Stand/.test(kind)) {
       if (shape !== 'point') trace(this.stands, feature);
-      if (name) this.name(feature, 'textStand', 0.75, 10, 1);
+      if (name && (kind === 'ParkingStandLocation' || !this.located.has(name))) this.name(feature, 'textStand', 0.75, 10, 1);
     } else if (/Guidance|TaxiwayLine|AsrnEdge/i.test(kind)) {
       if (shape === 'line') trace(this.guide, feature);
       if (name && this.guided) this.name(feature, 'text', 0.14, 11, 3);
@@ -109,7 +111,7 @@ export class MapLayer {
     }
     if (view.scale > 0.25) {
       context.strokeStyle = ink.line;
-      context.lineWidth = Math.max(0.5, pixel);
+      context.lineWidth = Math.max(0.4, pixel);
       context.stroke(this.guide);
     }
     if (view.scale > 0.35) {

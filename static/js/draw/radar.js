@@ -21,6 +21,8 @@ export class RadarLayer {
     this.failures = 0;
     this.on = false;
     this.opacity = 0.7;
+    /** the server's palette that suits ours */
+    this.ink = 'green';
   }
 
   /** @param {boolean} on @param {number} opacity */
@@ -53,7 +55,7 @@ export class RadarLayer {
   async fetch(id) {
     if (!this.projection) return;
     try {
-      const picture = await fetchVideo(id, this.projection);
+      const picture = await fetchVideo(id, this.projection, this.ink);
       this.due.set(id, performance.now() + PERIOD_MS);
       if (!picture) return;
       if (!this.on) {

@@ -74,14 +74,16 @@ export function drawSymbol(context, x, y, scale, rotation, look) {
   if (kind === 'unknown' || look.hollow) {
     context.fillStyle = look.halo;
     const alpha = context.globalAlpha;
-    context.globalAlpha = alpha * 0.7;
+    context.globalAlpha = alpha * 0.85;
     context.fill();
     context.globalAlpha = alpha;
     context.strokeStyle = look.ink;
-    context.lineWidth = 1.5;
-    if (look.hollow) context.setLineDash([3, 2]);
+    context.lineWidth = Math.max(w, h) > 26 ? 1.6 : 1.2;
+    // dashes on a small symbol are only a scribble
+    const dashed = look.hollow && Math.max(w, h) > 26;
+    if (dashed) context.setLineDash([4, 3]);
     context.stroke();
-    if (look.hollow) context.setLineDash([]);
+    if (dashed) context.setLineDash([]);
     return;
   }
   context.strokeStyle = look.halo;

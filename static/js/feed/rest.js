@@ -54,11 +54,11 @@ export async function setRunway(id, change) {
 
 /**
  * The newest radar picture with the corners it covers; null when there is none.
- * @param {string} radar @param {import('../geo/projection.js').Projection} projection
+ * @param {string} radar @param {import('../geo/projection.js').Projection} projection @param {string} ink
  * @returns {Promise<VideoPicture|null>}
  */
-export async function fetchVideo(radar, projection) {
-  const response = await call(`/api/v1/radars/${encodeURIComponent(radar)}/video.png`, { cache: 'no-store' });
+export async function fetchVideo(radar, projection, ink) {
+  const response = await call(`/api/v1/radars/${encodeURIComponent(radar)}/video.png?palette=${ink}`, { cache: 'no-store' });
   const corners = cornersOf(response.headers, projection);
   if (!corners) return null;
   const image = await createImageBitmap(await response.blob());

@@ -131,7 +131,7 @@ export function readRunways(features) {
   }
   const thresholds = features.filter((one) => one.kind === 'RunwayThreshold');
   return [...strips].map(([id, parts]) => {
-    const axis = longAxis(parts.flatMap((one) => one.rings[0]));
+    const axis = longAxis(parts.map((one) => one.rings[0]));
     const names = id.split('/');
     /** @type {[import('../types.js').RunwayEndShape, import('../types.js').RunwayEndShape]} */
     const ends = [
@@ -162,19 +162,31 @@ function misfit(designator, heading) {
   return Math.abs(Math.atan2(Math.sin(named - heading), Math.cos(named - heading)));
 }
 
-/** @param {number[][]} points @returns {{a: number[], b: number[], heading: number, width: number}} */
-function longAxis(points) {
-  const n = points.length;
-  const me = points.reduce((s, p) => s + p[0], 0) / n;
-  const mn = points.reduce((s, p) => s + p[1], 0) / n;
-  let ee = 0;
-  let nn = 0;
-  let en = 0;
-  for (const [e, k] of points) {
-    ee += (e - me) ** 2;
-    nn += (k - mn) ** 2;
-    en += (e - me) * (k - mn);
+/**
+ * The long axis of a polygon by its second moments of area (vertices alone would lean to where they are dense).
+ * @param {number[][][]} rings @returns {{a: number[], b: number[], heading: number, width: number}}
+ */
+function longAxis(rings) {
+  const points = rings.flat();
+  const [oe, on] = points[0];
+  let [w, me, mn, ee, nn, en] = [0, 0, 0, 0, 0, 0];
+  for (const ring of rings) {
+    for (let i = 0, j = ring.length - 1; i < ring.length; j = i, i += 1) {
+      const [x0, y0, x1, y1] = [ring[j][0] - oe, ring[j][1] - on, ring[i][0] - oe, ring[i][1] - on];
+      const cross = x0 * y1 - x1 * y0;
+      w += cross / 2;
+      me += (cross * (x0 + x1)) / 6;
+      mn += (cross * (y0 + y1)) / 6;
+      ee += (cross * (x0 * x0 + x0 * x1 + x1 * x1)) / 12;
+      nn += (cross * (y0 * y0 + y0 * y1 + y1 * y1)) / 12;
+      en += (cross * (x0 * y1 + 2 * x0 * y0 + 2 * x1 * y1 + x1 * y0)) / 24;
+    }
   }
+  if (w) {
+    [me, mn] = [me / w, mn / w];
+    [ee, nn, en] = [ee / w - me * me, nn / w - mn * mn, en / w - me * mn];
+  }
+  [me, mn] = [me + oe, mn + on];
   const heading = 0.5 * Math.atan2(2 * en, nn - ee);
   const [ue, un] = [Math.sin(heading), Math.cos(heading)];
   let [low, high, left, right] = [Infinity, -Infinity, Infinity, -Infinity];

@@ -43,9 +43,16 @@ export function labelText(track, level, coastedS) {
   return { first, second: parts.join('  '), mark };
 }
 
+/** @param {Track} track @returns {string} where it is, in words a controller uses; map ids are not words */
+export function placeOf(track) {
+  if (track.runway) return `RWY ${track.runway}`;
+  const zone = String(track.zone ?? '').trim();
+  return zone.includes('/') || zone.includes(':') ? '' : zone;
+}
+
 /** @param {string|null|undefined} zone @returns {string} a taxiway or stand name that fits a label */
 export function shortPlace(zone) {
   if (!zone) return '';
   const name = String(zone).trim();
-  return name.length <= 6 && !name.includes(':') && !/^\d{4,}$/.test(name) ? name : '';
+  return name.length <= 6 && !/[:/]/.test(name) && !/^\d{4,}$/.test(name) ? name : '';
 }

@@ -125,7 +125,7 @@ function bestPlace(request, boxes, screen) {
     const covered = boxes.overlap(x0 - 2, y0 - 1, x0 + w + 2, y0 + h + 1, id);
     const outside = Math.max(0, -x0) + Math.max(0, x0 + w - screen.width)
       + Math.max(0, -y0) + Math.max(0, y0 + h - screen.height);
-    const cost = covered + outside * h + (slot === request.slot ? 0 : 12 + 3 * slot);
+    const cost = covered + 6 * outside * h + (slot === request.slot ? 0 : 12 + 3 * slot);
     if (cost < bestCost) {
       best = slot;
       bestCost = cost;

@@ -80,11 +80,11 @@ export class AlertPanel {
     const part = (/** @type {string} */ name) => /** @type {HTMLElement} */ (element.querySelector(name));
     setText(part('.alert-stage'), alarm ? '▲ ALARM' : '◆ INFO');
     setText(part('.alert-runway'), alert.runway ? `RWY ${alert.runway}` : '');
-    setText(part('.alert-age'), isNumber(alert.raised_at) ? `${clock(alert.raised_at)}  ${duration(this.picture.time - alert.raised_at)}` : '');
+    setText(part('.alert-age'), isNumber(alert.raised_at) ? duration(this.picture.time - alert.raised_at) : '');
     setText(part('.alert-text'), alert.text || RULES[alert.rule] || alert.rule);
     const names = alert.targets.map((one) => one.callsign || `#${one.track}`).join(' · ');
     const eta = isNumber(alert.time_to_threshold_s) ? `  threshold in ${duration(alert.time_to_threshold_s)}` : '';
-    setText(part('.alert-detail'), `${names}${eta}${alert.simulated ? '  SIM' : ''}`);
+    setText(part('.alert-detail'), [`${names}${eta}`, `since ${clock(alert.raised_at)}${alert.holding_point ? `  hold ${alert.holding_point}` : ''}${alert.degraded ? '  degraded' : ''}${alert.simulated ? '  SIM' : ''}`].filter(Boolean).join('\n'));
     const button = /** @type {HTMLButtonElement} */ (part('.alert-ack'));
     button.disabled = !open || this.sending.has(alert.id);
     setText(button, open ? (this.sending.has(alert.id) ? '…' : 'ACK') : 'ACK’D');

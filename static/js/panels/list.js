@@ -1,7 +1,7 @@
 // The list of all targets, with search.
 
 import { knots, number } from '../model/format.js';
-import { classOf, isCoasting, isStanding, nameOf } from '../model/label_text.js';
+import { classOf, isCoasting, isStanding, nameOf, placeOf } from '../model/label_text.js';
 import { byId, el, keyed, setText } from './dom.js';
 
 /** @typedef {import('../types.js').Track} Track */
@@ -76,7 +76,7 @@ export class TargetList {
     part('button').setAttribute('aria-label', `${nameOf(track)}, ${kind}`);
     setText(part('.row-mark'), SHAPES[kind]);
     setText(part('.row-name'), nameOf(track));
-    setText(part('.row-place'), track.runway ? `RWY ${track.runway}` : (track.zone ?? ''));
+    setText(part('.row-place'), placeOf(track));
     setText(part('.row-speed'), isCoasting(track) ? 'coast' : isStanding(track) ? '–' : number(knots(track.speed_mps), 0, 'kt'));
   }
 }

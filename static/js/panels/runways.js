@@ -52,10 +52,10 @@ export class RunwayPanel {
     const stage = this.alerted.get(state.id);
     const chips = [];
     if (!state.open) chips.push(['closed', '✕ CLOSED']);
-    else if (state.in_use) chips.push(['use', `▸ ${state.in_use} in use`]);
+    else if (state.in_use) chips.push(['use', `${state.in_use} in use`]);
     else chips.push(['idle', 'not in use']);
     if (state.visibility === 'low') chips.push(['lvp', 'LVP']);
-    if (occupants.length) chips.push(['busy', `● OCCUPIED`]);
+    if (occupants.length) chips.push(['busy', '● OCCUPIED']);
     const text = chips.map((one) => one.join(':')).join('|');
     const box = /** @type {HTMLElement} */ (element.querySelector('.runway-chips'));
     if (box.dataset.text !== text) {

@@ -7,15 +7,23 @@ import { byId, setText } from './dom.js';
 
 /**
  * @param {number} nowMs @param {number} lastMessageMs @param {number} lastPictureMs local clock of the newest tracks
- * @param {number} periodS
+ * @param {number} periodS @param {number} startMs local clock when the page began to wait
  * @returns {Health} lost: nothing at all for twice the period (2 s at least); late: messages come, but no new tracks
  */
-export function healthOf(nowMs, lastMessageMs, lastPictureMs, periodS) {
-  if (lastPictureMs === -Infinity && lastMessageMs === -Infinity) return 'starting';
+export function healthOf(nowMs, lastMessageMs, lastPictureMs, periodS, startMs = 0) {
   const limit = Math.max(2, 2 * periodS) * 1000;
+  if (lastPictureMs === -Infinity && nowMs - startMs < 2 * limit) return 'starting';
   if (nowMs - lastMessageMs > limit) return 'lost';
   if (nowMs - lastPictureMs > Math.max(3000, 3 * periodS * 1000)) return 'late';
   return 'ok';
+}
+
+/** @param {Health} health @param {number} age s, of the picture @param {string} link @returns {string} */
+function bannerText(health, age, link) {
+  if (health === 'late') return Number.isFinite(age) ? `PICTURE LATE – no new tracks for ${Math.round(age)} s` : 'PICTURE LATE – connected, but no tracks yet';
+  if (health !== 'lost') return '';
+  const again = link === 'live' ? '' : ' – reconnecting…';
+  return Number.isFinite(age) ? `FEED LOST – this picture is ${Math.round(age)} s old, do not use it${again}` : `NO FEED – no picture${again}`;
 }
 
 /** Shows what `healthOf` finds. */
@@ -25,6 +33,7 @@ export class StatusBar {
     this.age = byId('data-age');
     this.utc = byId('data-clock');
     this.badge = byId('mode');
+    this.startMs = performance.now();
     this.toastTimer = 0;
     /** @type {Health} */
     this.health = 'starting';
@@ -35,17 +44,16 @@ export class StatusBar {
    * @param {import('../feed/live.js').LinkState} link @param {number} nowMs
    */
   update(picture, feed, link, nowMs) {
-    const health = healthOf(nowMs, feed.lastMessageMs, picture.timeMs, feed.periodS);
+    const health = healthOf(nowMs, feed.lastMessageMs, picture.timeMs, feed.periodS, this.startMs);
     this.health = health;
     const age = (nowMs - picture.timeMs) / 1000;
     setText(this.utc, clock(picture.time));
     setText(this.age, Number.isFinite(age) ? `${age < 10 ? age.toFixed(1) : Math.round(age)} s` : '–');
     document.body.dataset.health = health;
     const starting = health === 'starting';
-    const text = health === 'lost' ? `FEED LOST – the picture is ${Number.isFinite(age) ? `${Math.round(age)} s` : 'not'} old. Do not use. ${link === 'live' ? '' : 'Reconnecting…'}`
-      : health === 'late' ? `PICTURE LATE – no new tracks for ${Math.round(age)} s` : '';
+    const text = bannerText(health, age, link);
     this.banner.hidden = !text;
-    setText(this.banner, Number.isFinite(age) || !text ? text : 'FEED LOST – no picture. Reconnecting…');
+    setText(this.banner, text);
     this.banner.dataset.kind = health;
     const mode = picture.mode;
     this.badge.hidden = mode === 'live';

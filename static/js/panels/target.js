@@ -1,7 +1,7 @@
 // Everything that is known of the selected target.
 
 import { angle, bearing, clock, feet, knots, number } from '../model/format.js';
-import { classOf, nameOf } from '../model/label_text.js';
+import { classOf, nameOf, placeOf } from '../model/label_text.js';
 import { byId, el, setText } from './dom.js';
 
 /** @typedef {import('../types.js').Track} Track */
@@ -14,7 +14,7 @@ export function rowsOf(track) {
     ['Class', classOf(track)], ['Phase', track.phase ?? '–'], ['Speed', number(knots(track.speed_mps), 1, 'kt')],
     ['Course', bearing(track.course_deg)], ['Heading', bearing(track.heading_deg)],
     ['Height', track.on_ground === false ? number(feet(track.altitude_m), 0, 'ft') : 'on ground'],
-    ['Runway', track.runway ?? '–'], ['Place', track.zone ?? '–'], ['Size', size], ['Address', track.address ?? '–'],
+    ['Runway', track.runway ?? '–'], ['Place', (track.runway ? '' : placeOf(track)) || '–'], ['Size', size], ['Address', track.address ?? '–'],
     ['Accuracy', number(track.accuracy_m, 1, 'm')], ['Sources', (track.sources ?? []).join(', ') || '–'],
     ['Position', `${angle(track.lat ?? NaN, 'lat')} ${angle(track.lon ?? NaN, 'lon')}`], ['Time', `${clock(track.time)} UTC`],
   ];

@@ -18,6 +18,6 @@ export const day = {
   ink: {
     aircraft: '#0b4f86', vehicle: '#1c6a35', unknown: '#5a4c33', text: '#0d181f', textDim: '#44545f', leader: '#6f7f89',
     vector: '#2b6f9f', history: '#3f7399', alarm: '#cf1f24', alarmInk: '#ffffff', info: '#f0a800', infoInk: '#1d1402',
-    select: '#000000', sim: '#5b459c', labelBack: 'rgba(243,246,247,0.78)', tool: '#43307f', toolBack: 'rgba(255,255,255,0.92)', halo: '#eef2f2',
+    select: '#000000', sim: '#7d6cb0', labelBack: 'rgba(243,246,247,0.78)', tool: '#43307f', toolBack: 'rgba(255,255,255,0.92)', halo: '#eef2f2',
   },
 };
