@@ -119,11 +119,8 @@ class RadarChain:
         for scan in range(3):
             amplitude = rng.integers(20, 60, (64, 80), dtype=np.uint8)
             amplitude[10:14, 20:24] = 200
-            tiny.process(
-                Sweeps(
-                    0, scan, row, (row + 0.5) * video.azimuth_step_rad, (scan + row / 64).astype(float), amplitude, True
-                )
-            )
+            azimuth = ((row + 0.5) * video.azimuth_step_rad).astype(np.float64)
+            tiny.process(Sweeps(0, scan, row, azimuth, azimuth + scan, amplitude, last=True))
         tiny.flush()
 
     def _parts(self) -> list[str]:

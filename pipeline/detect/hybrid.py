@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.detect.calibration import estimation_loss_db, threshold_offset_db
-from pipeline.kernels.bits import add_pairs, bits_above
+from pipeline.kernels.bits import add_pairs, bits_above, borrowed, count_runs
 from pipeline.kernels.run_cap import CapSettings, fit_row
 from pipeline.state import ArrayState, read_only, remembered
 from pipeline.tables import Detections, Sweeps, VideoFormat
@@ -198,9 +198,19 @@ def _detect(
     tail: Any,
 ) -> None:
     refill, depth = cap
-    threshold, pair_sums = memory[2], memory[3]
-    cursor = swept[4]
-    budget, degraded = flood
+    amplitude, rows, mask, tail = borrowed(amplitude), borrowed(rows), borrowed(mask), borrowed(tail)
+    threshold, pair_sums = borrowed(memory[2]), borrowed(memory[3])
+    cursor = borrowed(swept[4])
+    budget, degraded = borrowed(flood[0]), borrowed(flood[1])
+    memory = (borrowed(memory[0]), borrowed(memory[1]), threshold, pair_sums)
+    swept = (borrowed(swept[0]), borrowed(swept[1]), borrowed(swept[2]), borrowed(swept[3]), cursor)
+    layout = (
+        borrowed(layout[0]),
+        borrowed(layout[1]),
+        borrowed(layout[2]),
+        borrowed(layout[3]),
+        borrowed(layout[4]),
+    )
     n, ranges = amplitude.shape
     whole = ranges // 64
     rest = ranges - 64 * whole
@@ -235,7 +245,12 @@ def _detect(
             anything |= word
         budget[0] = min(budget[0] + refill, depth)
         if anything:
-            degraded[0] += fit_row(amplitude[i], limits_at, bits, budget, tail)
+            runs = count_runs(bits)
+            if runs <= budget[0]:
+                budget[0] -= runs
+            else:
+                degraded[0] += 1
+                fit_row(amplitude[i], limits_at, bits, budget, tail)
 
 
 @njit(nogil=True, cache=True)

@@ -69,6 +69,23 @@ def add_pairs(typing: Any, cells: Any, sums: Any) -> Any:
 
 
 @intrinsic
+def borrowed(typing: Any, array: Any) -> Any:
+    """The same array without reference counting: handing it (or slices of it) to another kernel costs no atomic
+    operation.
+
+    Only for arrays that outlive the kernel, which arguments from Python do.
+    """
+
+    def build(context: Any, builder: Any, signature: Any, words: Any) -> Any:
+        view = context.make_array(signature.args[0])(context, builder, value=words[0])
+        view.meminfo = ir.Constant(view.meminfo.type, None)
+        view.parent = ir.Constant(view.parent.type, None)
+        return view._getvalue()
+
+    return array(array), build
+
+
+@intrinsic
 def trailing_zeros(typing: Any, word: Any) -> Any:
     """Position of the lowest set bit; 64 for an empty word."""
 
@@ -91,11 +108,11 @@ def set_bits(typing: Any, word: Any) -> Any:
 @njit(nogil=True, cache=True)
 def count_runs(mask: Any) -> Any:
     """Number of runs of set bits in one row of words."""
-    runs: Any = 0
+    runs = types.uint64(0)  # with a signed 0 numba would count in floating point
     carry = types.uint64(0)
     one = types.uint64(1)
     for w in range(mask.size):
         word = mask[w]
         runs += set_bits(word & ~((word << one) | carry))
         carry = word >> types.uint64(63)
-    return runs
+    return types.int64(runs)

@@ -14,13 +14,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipeline.kernels.bits import trailing_zeros
+from pipeline.kernels.bits import borrowed, trailing_zeros
 from pipeline.kernels.plot_shape import COLUMNS, Geometry, measure_plot
 from pipeline.kernels.runs import (
     END,
     FIELDS,
     FIRST,
     FREE,
+    GRID,
     LAST,
     NEXT,
     PARENT,
@@ -36,8 +37,11 @@ from pipeline.kernels.runs import (
 from pipeline.state import ArrayState, read_only, remembered
 from pipeline.tables import Detections, Sweeps
 
-NEWEST, UNUSED, DROPPED, CUT, SMALL, CELLS = range(6)
-"""Places in `ComponentState.numbers`: newest row, free runs in the pool, and counts."""
+NEWEST, OLDEST, UNUSED, DROPPED, CUT, SMALL, CELLS = range(7)
+"""Places in `ComponentState.numbers`: newest row, oldest row with runs in the window, free runs in the pool, and
+counts."""
+
+NEVER = np.iinfo(np.int64).max
 
 
 @dataclass(eq=False, kw_only=True)
@@ -69,7 +73,7 @@ class ComponentState(ArrayState):
             "unused": np.arange(open_runs - 1, -1, -1, dtype=np.int64),
             "window": np.zeros((reach + 1, a_row), np.int64),
             "window_rows": np.tile(np.array([-1, 0], np.int64), (reach + 1, 1)),
-            "numbers": np.array([-1, open_runs, 0, 0, 0, 0], np.int64),
+            "numbers": np.array([-1, NEVER, open_runs, 0, 0, 0, 0], np.int64),
             "turn": np.zeros((3, azimuths)),
             "azimuth": np.full(azimuths, np.nan),
         }
@@ -150,9 +154,14 @@ def _take_rows(
     geometry: Any,
     out: Any,
 ) -> tuple[int, int]:
-    amplitude, rows, azimuths, times, mask = block
-    runs, _, window, window_rows, numbers = pool
-    turn, azimuth = sweep
+    amplitude, mask = borrowed(block[0]), borrowed(block[4])
+    rows, azimuths, times = borrowed(block[1]), borrowed(block[2]), borrowed(block[3])
+    runs, unused = borrowed(pool[0]), borrowed(pool[1])
+    window, window_rows, numbers = borrowed(pool[2]), borrowed(pool[3]), borrowed(pool[4])
+    reach_of_cell, out = borrowed(reach_of_cell), borrowed(out)
+    turn, azimuth = borrowed(sweep[0]), borrowed(sweep[1])
+    pool = (runs, unused, window, window_rows, numbers)
+    geometry = (geometry[0], borrowed(geometry[1]))
     count = 0
     words = mask.shape[1]
     cells = amplitude.shape[1]
@@ -160,7 +169,7 @@ def _take_rows(
     while done < rows.size:
         bits = mask[done]
         row = first_row + rows[done]
-        if numbers[UNUSED] < runs.shape[0]:
+        if numbers[UNUSED] < runs.shape[0] and numbers[OLDEST] <= row - depth:
             if count + min(runs.shape[0] - numbers[UNUSED], window.size) > out.shape[0]:
                 return done, count
             count = _retire(row, pool, limits, turn, geometry, out, count)
@@ -174,20 +183,26 @@ def _take_rows(
                 azimuth[i] = azimuths[done]
                 turn[0, i], turn[1, i] = np.sin(azimuths[done]), np.cos(azimuths[done])
             turn[2, i] = times[done]
-            n = _find_runs(bits, amplitude[done], row, reach_of_cell, cells, pool, window[row % depth])
-            window_rows[row % depth, 0] = row
-            window_rows[row % depth, 1] = n
-            _link_rows(row, n, limits[1], pool)
+            slot = row % depth
+            n = _find_runs(bits, amplitude[done], row, i, reach_of_cell, cells, pool, window[slot])
+            if n:
+                if numbers[UNUSED] + n == runs.shape[0]:
+                    numbers[OLDEST] = row
+                window_rows[slot, 0] = row
+                window_rows[slot, 1] = n
+                _link_rows(row, slot, n, limits[1], pool)
         done += 1
     return done, count
 
 
 @njit(nogil=True, cache=True)
-def _find_runs(bits: Any, cells: Any, row: int, reach_of_cell: Any, ranges: int, pool: Any, slot: Any) -> int:
+def _find_runs(
+    bits: Any, cells: Any, row: int, grid_row: int, reach_of_cell: Any, ranges: int, pool: Any, slot: Any
+) -> int:
     runs, unused, numbers = pool[0], pool[1], pool[4]
     one, top = np.uint64(1), np.uint64(63)
     n = 0
-    start = -1
+    start: Any = -1
     carry = np.uint64(0)
     for w in range(bits.size + 1):
         word = bits[w] if w < bits.size else np.uint64(0)
@@ -216,7 +231,7 @@ def _find_runs(bits: Any, cells: Any, row: int, reach_of_cell: Any, ranges: int,
                     runs[run, ROW], runs[run, START], runs[run, END] = row, start, end
                     runs[run, SUM], runs[run, PEAK], runs[run, REACH] = total, peak, reach
                     runs[run, PARENT], runs[run, NEXT], runs[run, TAIL] = run, -1, run
-                    runs[run, FIRST], runs[run, LAST] = row, row
+                    runs[run, FIRST], runs[run, LAST], runs[run, GRID] = row, row, grid_row
                     slot[n] = run
                     n += 1
                 start = end
@@ -225,16 +240,17 @@ def _find_runs(bits: Any, cells: Any, row: int, reach_of_cell: Any, ranges: int,
 
 
 @njit(nogil=True, cache=True)
-def _link_rows(row: int, n: int, most_rows: int, pool: Any) -> None:
+def _link_rows(row: int, slot_of_row: int, n: int, most_rows: int, pool: Any) -> None:
     runs, window, window_rows = pool[0], pool[2], pool[3]
     depth = window.shape[0]
-    slot = window[row % depth]
+    slot = window[slot_of_row]
     # a run's two neighbours in its own row are enough: the reach falls with range, so what links over a run links to it
     for k in range(1, n):
         if runs[slot[k], START] - runs[slot[k - 1], END] < runs[slot[k], REACH]:
             unite(runs, slot[k - 1], slot[k])
-    for back in range(1, depth):
-        other = (row - back) % depth
+    other = slot_of_row
+    for back in range(1, runs[slot[0], REACH] + 1):
+        other = other - 1 if other else depth - 1
         if window_rows[other, 0] != row - back:
             continue
         before, m = window[other], window_rows[other, 1]
@@ -259,17 +275,15 @@ def _link_rows(row: int, n: int, most_rows: int, pool: Any) -> None:
 
 
 @njit(nogil=True, cache=True)
-def _retire(row: int, pool: Any, limits: Any, turn: Any, geometry: Any, out: Any, count: int) -> int:
+def _retire(row: int, pool: Any, limits: Any, turn: Any, geometry: Any, out: Any, count: int) -> Any:
     """Complete the components whose last row can no longer be reached from `row`."""
     runs, unused, window, window_rows, numbers = pool
     fewest, most_rows = limits
     constants, sums = geometry
     depth = window.shape[0]
-    newest = numbers[NEWEST]
-    for old in range(newest - depth + 1, min(newest, row - depth) + 1):
+    while numbers[OLDEST] <= row - depth:
+        old = numbers[OLDEST]
         slot = old % depth
-        if window_rows[slot, 0] != old:
-            continue
         for k in range(window_rows[slot, 1]):
             run = window[slot, k]
             if runs[run, PARENT] == FREE:
@@ -296,11 +310,15 @@ def _retire(row: int, pool: Any, limits: Any, turn: Any, geometry: Any, out: Any
                 numbers[UNUSED] += 1
                 one = runs[one, NEXT]
         window_rows[slot, 0] = -1
+        numbers[OLDEST] = NEVER
+        for other in range(depth):
+            if window_rows[other, 0] >= 0:
+                numbers[OLDEST] = min(numbers[OLDEST], window_rows[other, 0])
     return count
 
 
 @njit(nogil=True, cache=True)
-def _closed_row(runs: Any, window: Any, window_rows: Any, numbers: Any) -> int:
+def _closed_row(runs: Any, window: Any, window_rows: Any, numbers: Any) -> Any:
     closed = numbers[NEWEST] + 1
     if numbers[UNUSED] == runs.shape[0]:
         return closed

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipeline.kernels.runs import END, FIRST, LAST, NEXT, PEAK, ROW, START, SUM
+from pipeline.kernels.runs import END, FIRST, GRID, LAST, NEXT, PEAK, ROW, START, SUM
 from pipeline.sites import RadarSite
 from pipeline.tables import Plots
 
@@ -95,16 +95,15 @@ def measure_plot(root: int, runs: Any, turn: Any, constants: Any, sums: Any, out
     out.
     """
     east, north, height, step, azimuth_step, beam, azimuths = constants
-    turn_rows = np.int64(azimuths)
     sine, cosine, times = turn[0], turn[1], turn[2]
     total, amplitude, peak = 0, 0, 0
     first_cell, last_cell = runs[root, START], runs[root, END]
-    t0 = times[runs[root, ROW] % turn_rows]
+    t0 = times[runs[root, GRID]]
     st = sx = sy = sxx = sxy = syy = sr = 0.0
     run = root
     while run >= 0:
         a, b = runs[run, START], runs[run, END]
-        row = runs[run, ROW] % turn_rows
+        row = runs[run, GRID]
         n = b - a
         total += n
         amplitude += runs[run, SUM]
@@ -122,8 +121,8 @@ def measure_plot(root: int, runs: Any, turn: Any, constants: Any, sums: Any, out
         syy += c * c * g2
         run = runs[run, NEXT]
     mx, my = sx / total, sy / total
-    ground = np.hypot(mx, my)
-    first_row = runs[root, ROW] % turn_rows
+    ground = np.sqrt(mx * mx + my * my)
+    first_row = runs[root, GRID]
     ux, uy = (mx / ground, my / ground) if ground > 0 else (sine[first_row], cosine[first_row])
     cross = max(ground, step) * azimuth_step
     resolution = max(ground, step) * beam
@@ -140,21 +139,23 @@ def measure_plot(root: int, runs: Any, turn: Any, constants: Any, sums: Any, out
     excess = box_v - grid_v
     dxx, dxy, dyy = cxx - excess * uy * uy, cxy + excess * ux * uy, cyy - excess * ux * ux
     axis = 0.5 * np.arctan2(2 * dxy, dyy - dxx)
-    half = np.hypot(dyy - dxx, 2 * dxy) / 2
+    half = np.sqrt((dyy - dxx) ** 2 + 4 * dxy * dxy) / 2
     middle = (dxx + dyy) / 2
     major, minor = middle + half, max(middle - half, box_u)
     ax, ay = np.sin(axis), np.cos(axis)
     low_a, high_a, low_b, high_b = np.inf, -np.inf, np.inf, -np.inf
     run = root
     while run >= 0:
-        row = runs[run, ROW] % turn_rows
+        row = runs[run, GRID]
         for edge in range(2):
             j = runs[run, START] if edge == 0 else runs[run, END] - 1
             g = sums[0, j + 1] - sums[0, j]
             x, y = sine[row] * g - mx, cosine[row] * g - my
             along, across = x * ax + y * ay, x * ay - y * ax
-            low_a, high_a = min(low_a, along), max(high_a, along)
-            low_b, high_b = min(low_b, across), max(high_b, across)
+            low_a = along if along < low_a else low_a
+            high_a = along if along > high_a else high_a
+            low_b = across if across < low_b else low_b
+            high_b = across if across > high_b else high_b
         run = runs[run, NEXT]
     radial, tangential = abs(ax * ux + ay * uy), abs(ax * uy - ay * ux)
     # extent of the cells = extent of the target + resolution - grid, in the direction concerned
@@ -173,7 +174,7 @@ def measure_plot(root: int, runs: Any, turn: Any, constants: Any, sums: Any, out
     out[1] = np.rint((centre_row - azimuth / azimuth_step) / azimuths)
     out[2] = east + mx
     out[3] = north + my
-    out[7] = np.hypot(ground, height)
+    out[7] = np.sqrt(ground * ground + height * height)
     out[8] = azimuth
     out[9] = (last_cell - first_cell) * step
     out[10] = (runs[root, LAST] - runs[root, FIRST] + 1) * azimuth_step
@@ -184,7 +185,7 @@ def measure_plot(root: int, runs: Any, turn: Any, constants: Any, sums: Any, out
     out[15] = peak
     out[16] = bearing
     out[17] = deviation
-    out[18] = runs[root, FIRST] % turn_rows
+    out[18] = runs[root, FIRST] % np.int64(azimuths)
     out[19] = runs[root, LAST] - runs[root, FIRST] + 1
     out[20] = first_cell
     out[21] = last_cell - first_cell

@@ -28,11 +28,11 @@ class CapSettings:
 
 
 @njit(nogil=True, cache=True)
-def fit_row(cells: Any, limits_at: int, mask: Any, budget: Any, tail: Any) -> int:
-    """Take the runs of one row out of the bucket; where they do not fit, raise the limits until they do.
+def fit_row(cells: Any, limits_at: int, mask: Any, budget: Any, tail: Any) -> None:
+    """Take the runs of one row out of the bucket; they do not fit, so the limits are raised until they do.
 
     cells: (ranges) uint8. limits_at: address of the row's limits, 64 bytes a word. mask: (words) uint64, rewritten when
-    needed. tail: 64 bytes of which those past the row's rest are 0. Returns 1 when the limits were raised, else 0.
+    needed. tail: 64 bytes of which those past the row's rest are 0.
     """
     runs = count_runs(mask)
     raised = 0
@@ -49,4 +49,3 @@ def fit_row(cells: Any, limits_at: int, mask: Any, budget: Any, tail: Any) -> in
             mask[whole] = bits_above_raised(tail.ctypes.data, limits_at + np.uintp(64 * whole), step)
         runs = count_runs(mask)
     budget[0] -= runs
-    return 1 if raised else 0

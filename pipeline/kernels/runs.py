@@ -13,6 +13,9 @@ PARENT, NEXT, TAIL, FIRST, LAST = 6, 7, 8, 9, 10
 """Union-find parent (FREE when unused); next run of the component (-1: none); valid in a root only: its last run, and
 the component's first and last absolute row."""
 
+GRID = 11
+"""The row in the azimuth grid, 0 .. azimuths - 1."""
+
 FIELDS = 12
 FREE = -1
 
