@@ -16,24 +16,34 @@ TWO_PI = 2 * math.pi
 
 @dataclass(slots=True)
 class RadarClock:
-    """One radar's antenna as seen so far. closed_to: absolute row; time: UTC s belonging to it; period: s a turn."""
+    """One radar's antenna as seen so far. period: s a turn. closed_to: absolute row that is closed.
+
+    time: UTC s at which the antenna passed that row; the newest sweep, of UTC `newest`, may be well past it, since a
+    large echo still open holds the row back.
+    """
 
     period: float
     closed_to: int = 0
     time: float = -np.inf
+    newest: float = -np.inf
 
-    def heard(self, closed_to: int, time: float, azimuths: int, nominal: float) -> None:
+    def heard(self, closed_to: int, newest: float, azimuths: int, nominal: float) -> None:
         """A sector was closed; the period is learnt from what passed since the last."""
-        rows, passed = closed_to - self.closed_to, time - self.time
+        rows, passed = closed_to - self.closed_to, newest - self.newest
         if math.isfinite(passed) and passed > 0 and azimuths // 64 <= rows <= 4 * azimuths:
             turn = passed * azimuths / rows
             if nominal / 4 <= turn <= nominal * 4:
-                self.period += (turn - self.period) * min(1.0, 0.5 * rows / azimuths)
-        self.closed_to, self.time = closed_to, time
+                self.period += (turn - self.period) * min(1.0, 0.25 * rows / azimuths)
+        due = min(self.time + rows * self.period / azimuths, newest)
+        self.time = due if due > newest - 0.5 * self.period else newest
+        self.closed_to, self.newest = closed_to, newest
 
-    def time_of(self, row: Array, azimuths: int) -> Floats:
-        """UTC s at which the antenna passed absolute rows."""
-        return np.asarray(self.time - (self.closed_to - row) * (self.period / azimuths), dtype=np.float64)
+    def set_by(self, rows: Array, times: Floats, azimuths: int) -> None:
+        """Plots tell at what time the antenna was at their row."""
+        if len(rows):
+            told = float(np.median(times + (self.closed_to - rows) * (self.period / azimuths)))
+            if self.newest - 0.5 * self.period <= told <= self.newest + 0.1 * self.period:
+                self.time = told
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +71,6 @@ def plan_looks(
         [
             site.east,
             site.north,
-            site.north_offset,
             video.azimuths,
             max(video.first_range_m - video.range_step_m, 0.0),
             video.first_range_m + (video.ranges - 0.5) * video.range_step_m,
@@ -83,8 +92,8 @@ def _plan(
     radar: Floats, closed_to: int, time: Floats, state: Floats, cov: Floats, extent: Floats, looked: Array,
     gate: float, max_gate: float, row: Array, at: Floats, guard: Floats, due: Array, covered: Array,
 ) -> None:  # fmt: skip
-    east, north, offset, azimuths = radar[0], radar[1], radar[2], int(radar[3])
-    period, now, beamwidth, step = radar[6], radar[7], radar[8], radar[9]
+    east, north, azimuths = radar[0], radar[1], int(radar[2])
+    period, now, beamwidth, step = radar[5], radar[6], radar[7], radar[8]
     for i in range(len(time)):
         if looked[i] + azimuths // 2 > closed_to:
             row[i], at[i], guard[i], due[i], covered[i] = looked[i] + azimuths, now, 0.0, False, False
@@ -94,7 +103,7 @@ def _plan(
         r = np.int64(0)
         for turn in range(2):
             e, n = x[0] + dt * x[2] - east, x[1] + dt * x[3] - north
-            azimuth = (math.atan2(e, n) - offset) % TWO_PI
+            azimuth = math.atan2(e, n) % TWO_PI
             modulo = min(int(azimuth / TWO_PI * azimuths), azimuths - 1)
             if turn == 0:
                 after = looked[i] + azimuths // 2
@@ -116,4 +125,4 @@ def _plan(
             dt += late * period
         row[i], at[i] = r, time[i] + dt
         due[i] = r + guard[i] <= closed_to
-        covered[i] = radar[4] <= distance <= radar[5]
+        covered[i] = radar[3] <= distance <= radar[4]

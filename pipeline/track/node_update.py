@@ -103,7 +103,7 @@ def _begin(core: Core, events: NodeEvents, event: int, time: float, lane: Floats
     core.count("node_started", made.stop - made.start)
     if knows_speed and made.stop > made.start:
         row = made.start
-        table.state[row, 2:] = speed * lane
-        velocity = (1.0 + 0.2 * speed) ** 2 * np.outer(lane, lane) + (1.0 + 0.1 * speed) ** 2 * np.outer(side, side)
+        # a lane is driven both ways: the speed is known, its sense is not
+        velocity = (1.0 + speed) ** 2 * np.outer(lane, lane) + (1.0 + 0.1 * speed) ** 2 * np.outer(side, side)
         table.covariance[row, 2:, 2:] = velocity
         table.one_point[row] = False

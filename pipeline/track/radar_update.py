@@ -30,6 +30,7 @@ def take_sector(core: Core, sector: SectorPlots) -> None:
     plots = Plots.concatenate([core.waiting[sector.radar], fresh]) if len(core.waiting[sector.radar]) else fresh
     plots = plots[np.lexsort((plots.north, plots.east, plots.time))]
     rows = _absolute_rows(core, sector.radar, plots)
+    clock.set_by(rows, plots.time, site.video.azimuths)
     stale = rows < sector.closed_to - 2 * site.video.azimuths
     core.count("plot_stale", int(stale.sum()))
     if stale.any():
@@ -49,8 +50,8 @@ def _acceptable(core: Core, sector: SectorPlots) -> bool:
     if core.table.n and sector.time < core.time - core.settings.max_lag:
         core.count("sector_late")
         return False
-    if sector.closed_to < clock.closed_to or sector.time < clock.time:
-        if core.table.n and sector.time <= clock.time:
+    if sector.closed_to < clock.closed_to or sector.time < clock.newest:
+        if core.table.n and sector.time <= clock.newest:
             core.count("sector_late")
             return False
         _restart(core, sector)
@@ -88,9 +89,8 @@ def _usable(core: Core, sector: SectorPlots) -> Plots:
 
 def _absolute_rows(core: Core, radar: int, plots: Plots) -> Array:
     """Absolute row of each plot's azimuth, on the turn that its time belongs to."""
-    site, clock = core.radars[radar], core.clocks[radar]
-    azimuths = site.video.azimuths
-    own = ((plots.azimuth - site.north_offset) % (2 * math.pi) / (2 * math.pi) * azimuths).astype(np.int64) % azimuths
+    clock, azimuths = core.clocks[radar], core.radars[radar].video.azimuths
+    own = (plots.azimuth % (2 * math.pi) / (2 * math.pi) * azimuths).astype(np.int64) % azimuths
     about = clock.closed_to - (clock.time - plots.time) / clock.period * azimuths
     return np.asarray(own + np.rint((about - own) / azimuths).astype(np.int64) * azimuths)
 

@@ -180,10 +180,10 @@ def _made_up_sector(site: RadarSite, turn: int) -> SectorPlots:
     """One turn of a radar with two targets and a split one, for warm-up."""
     a = site.video.azimuths
     distance = np.array([300.0, 310.0, 600.0])
-    azimuth = np.array([1.0, 1.0, 2.0]) + site.north_offset
+    azimuth = np.array([1.0, 1.0, 2.0])
     plots = Plots.build(
         3,
-        time=1e9 + turn + (azimuth - site.north_offset) / (2 * np.pi),
+        time=1e9 + turn + azimuth / (2 * np.pi),
         east=site.east + distance * np.sin(azimuth),
         north=site.north + distance * np.cos(azimuth),
         covariance=9.0 * np.eye(2),

@@ -71,7 +71,7 @@ def crossing(path: Callable[[float], tuple[float, float]], scan: int, site: Rada
     t = scan + 0.5
     for _ in range(6):
         e, n = path(t)
-        t = scan + (np.arctan2(e - site.east, n - site.north) - site.north_offset) % (2 * np.pi) / (2 * np.pi)
+        t = scan + (np.arctan2(e - site.east, n - site.north)) % (2 * np.pi) / (2 * np.pi)
     return float(t)
 
 
@@ -130,7 +130,7 @@ def scan_plots(
 def split_scan(plots: Plots, scan: int, sectors: int, site: RadarSite = RADAR, radar: int = 0) -> list[SectorPlots]:
     """The same turn as equal sectors; a plot comes with the sector in which its centroid is closed."""
     made = []
-    own = (plots.azimuth - site.north_offset) % (2 * np.pi) / (2 * np.pi) * A
+    own = plots.azimuth % (2 * np.pi) / (2 * np.pi) * A
     for k in range(sectors):
         low, high = A * k // sectors, A * (k + 1) // sectors
         inside = (own >= low) & (own < high)

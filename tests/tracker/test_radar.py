@@ -437,3 +437,36 @@ class TestBadInput:
             tracker.sector(SectorPlots(0, scan, T0 + scan + 1, scan * A, (scan + 1) * A, plots))
         assert tracker.counters["no_room"] > 0
         assert len(tracker.tracks()) <= 500
+
+
+@pytest.mark.parametrize("lag", [100, 900])
+def test_an_echo_still_open_holds_the_closed_row_back_and_nothing_is_lost(lag: int) -> None:
+    """The newest sweep is up to a fifth of a turn past the row that is closed."""
+    tracker = make_tracker()
+    for scan in range(20):
+        plots = scan_plots(np.random.default_rng(scan), MIXED, scan)
+        for sector in split_scan(plots, scan, 8):
+            late = sector.time + lag / A
+            tracker.sector(SectorPlots(0, scan, late, sector.closed_from, sector.closed_to, sector.plots))
+    tracks = tracker.tracks()
+    assert len(tracks) == len(MIXED)
+    assert tracker.counters["confirmed"] == len(MIXED)
+    assert (tracks.hits >= 15).all()
+
+
+@pytest.mark.parametrize("period", [0.8, 1.3])
+def test_a_radar_that_turns_faster_or_slower_than_the_settings_say(period: float) -> None:
+    target = Target(line(500, 300, 10, 0), 12, 4)
+    tracker = make_tracker()
+    for scan in range(25):
+        t = (scan + 0.16) * period
+        for _ in range(5):
+            azimuth = np.arctan2(*target.path(t)) % (2 * np.pi)
+            t = (scan + azimuth / (2 * np.pi)) * period
+        for sector in split_scan(make_plots(T0 + t, [target.path(t)], 2.0), scan, 8):
+            time = T0 + sector.closed_to / A * period
+            tracker.sector(SectorPlots(0, scan, time, sector.closed_from, sector.closed_to, sector.plots))
+    tracks = tracker.tracks()
+    assert len(tracks) == 1
+    assert tracks.hits[0] >= 22
+    assert error(tracks, target) < 5
