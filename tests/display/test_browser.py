@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -42,8 +43,7 @@ def test_targets_are_shown_and_move_smoothly(screen: Screen, serving: Serving) -
         }"""
     )
     steps = [
-        (((b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2) ** 0.5, (b[0] - a[0]) / 1000)
-        for a, b in zip(frames, frames[1:], strict=False)
+        (((b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2) ** 0.5, (b[0] - a[0]) / 1000) for a, b in itertools.pairwise(frames)
     ]
     assert sum(step for step, _ in steps) > 5, "the aircraft on the runway moves"
     # 65 m/s between updates; a correction may add to that for a moment, but nothing jumps
