@@ -127,7 +127,7 @@ export class Display {
     if (nowMs - this.placedMs >= PLACE_EVERY_MS || (turned && nowMs - this.placedMs >= 80)) {
       this.placedMs = nowMs;
       this.placedView = this.view.version;
-      this.labels.place(context, this.scene);
+      this.labels.place(context, this.scene, this.map?.designators(this.view));
     }
     const ease = this.still.matches ? 1 : 1 - Math.exp(-Math.min(200, nowMs - this.drawnMs) / 90);
     this.drawnMs = nowMs;

@@ -56,6 +56,7 @@ const list = new TargetList(picture, { onOpen: (id) => display.select(id, true),
 const tools = bindToolbar(settings);
 const help = makeHelp();
 settings.watch((choices) => list.setOpen(choices.list));
+settings.onSet = () => saveView();
 
 /** @type {import('./feed/live.js').LinkState} */
 let link = 'connecting';
@@ -164,6 +165,7 @@ function saveView() {
   clearTimeout(saveTimer);
   saveTimer = window.setTimeout(() => {
     const now = viewToQuery(view, new URLSearchParams(location.search));
+    for (const key of settings.touched) now.delete(key);
     if (display.selected !== null) now.set('track', String(display.selected));
     else now.delete('track');
     try {
@@ -186,12 +188,16 @@ function refresh() {
   /** @type {(() => void)[]} */
   const work = [
     () => feed.watch(nowMs),
-    () => status.update(picture, feed, link, nowMs),
+    () => status.update(picture, feed, link, stage.failing, nowMs),
     () => alerts.update(),
     () => runways.update(display.alertedRunways()),
     () => sensors.update(),
     () => target.update(display.selected, display.following),
-    () => sound.update(picture.liveAlerts(), needsAttention, nowMs),
+    () => {
+      const live = picture.liveAlerts();
+      sound.update(live, needsAttention, nowMs);
+      byId('sound').classList.toggle('is-wanted', !sound.armed && live.some(needsAttention));
+    },
     () => display.radar.poll(picture.sensors.values(), nowMs),
     () => {
       if (statusVersion !== picture.statusVersion) display.touch(0);

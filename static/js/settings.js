@@ -61,6 +61,10 @@ export class Settings {
     this.choices = sane({ ...this.stored(), ...Object.fromEntries(query) });
     /** @type {((choices: Choices) => void)[]} */
     this.listeners = [];
+    /** @type {Set<string>} changed by hand: what the address says of them no longer holds */
+    this.touched = new Set();
+    /** @type {() => void} */
+    this.onSet = () => {};
   }
 
   /** @returns {Record<string, unknown>} */
@@ -81,7 +85,9 @@ export class Settings {
     } catch {
       // a browser that keeps nothing still shows the picture
     }
+    for (const key of Object.keys(changes)) this.touched.add(key);
     for (const listener of this.listeners) listener(this.choices);
+    this.onSet();
   }
 
   /** @param {(choices: Choices) => void} listener called now and at every change */

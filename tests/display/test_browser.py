@@ -239,3 +239,18 @@ def test_hostile_text_stays_text(screen: Screen, serving: Serving) -> None:
         serving.service.clear_alert(made.id)
     screen.until("airside.alerts().length === 0")
     assert screen.errors == []
+
+
+def test_a_layer_that_cannot_be_drawn_says_so_and_the_rest_goes_on(screen: Screen) -> None:
+    screen.page.evaluate(
+        """() => {
+          window.kept = CanvasRenderingContext2D.prototype.fillText;
+          CanvasRenderingContext2D.prototype.fillText = () => { throw new Error('broken on purpose'); };
+        }"""
+    )
+    screen.until("airside.health() === 'fault'")
+    assert "DISPLAY FAULT" in text(screen, "#banner")
+    frames = screen.ask("counts().frames")
+    screen.until(f"airside.counts().frames > {frames} + 5")
+    screen.page.evaluate("() => { CanvasRenderingContext2D.prototype.fillText = window.kept; }")
+    screen.until("airside.health() === 'ok'")

@@ -60,8 +60,11 @@ export class LabelLayer {
     return moving + (classOf(track) === 'aircraft' ? 20 : classOf(track) === 'vehicle' ? 10 : 0);
   }
 
-  /** @param {CanvasRenderingContext2D} context @param {Scene} scene */
-  place(context, scene) {
+  /**
+   * @param {CanvasRenderingContext2D} context @param {Scene} scene
+   * @param {{x: number, y: number}[]} [keepClear] what else must stay readable
+   */
+  place(context, scene, keepClear = []) {
     const { picture, view, choices } = scene;
     const here = [...picture.targets.values()].filter((one) => onScreen(one, view, 10));
     const crowded = here.length > CROWD && view.scale < 0.6;
@@ -84,6 +87,7 @@ export class LabelLayer {
       });
     }
     const symbols = here.map((one) => ({ id: one.track.id, x: one.x, y: one.y, radius: Math.min(16, radiusOf(one, view.scale)) }));
+    keepClear.forEach(({ x, y }, i) => symbols.push({ id: -1e6 - i, x, y, radius: 10 }));
     for (const placed of placeLabels(requests, symbols, view)) {
       const label = picture.targets.get(placed.id)?.label;
       if (!label) continue;

@@ -229,19 +229,24 @@ export class MapLayer {
     }
   }
 
+  /** @param {Viewport} view @returns {{text: string, x: number, y: number}[]} where the runway designators stand */
+  designators(view) {
+    const back = 34 / view.scale;
+    return this.airport.runways.flatMap((runway) => runway.ends.map((end) => {
+      const [x, y] = view.toScreen(end.e - back * Math.sin(end.heading), end.n - back * Math.cos(end.heading));
+      return { text: end.designator, x, y };
+    }));
+  }
+
   /** @param {CanvasRenderingContext2D} context @param {Viewport} view @param {Theme} theme */
   texts(context, view, theme) {
     const taken = new Set();
     context.textAlign = 'center';
     context.textBaseline = 'middle';
     context.lineJoin = 'round';
-    for (const runway of this.airport.runways) {
-      for (const end of runway.ends) {
-        const back = 34 / view.scale;
-        const [x, y] = view.toScreen(end.e - back * Math.sin(end.heading), end.n - back * Math.cos(end.heading));
-        claim(taken, x, y, 30);
-        this.text(context, end.designator, x, y, '600 14px system-ui, sans-serif', theme.map.textRunway, theme.map.halo);
-      }
+    for (const { text, x, y } of this.designators(view)) {
+      claim(taken, x, y, 30);
+      this.text(context, text, x, y, '600 14px system-ui, sans-serif', theme.map.textRunway, theme.map.halo);
     }
     for (const { text, points, ink, from, size } of this.names) {
       if (view.scale < from) continue;

@@ -25,6 +25,8 @@ export class Stage {
     this.lastLiveMs = -Infinity;
     this.hurryUntilMs = -Infinity;
     this.errors = 0;
+    /** frames in a row in which something could not be drawn */
+    this.failing = 0;
     this.frames = 0;
     /** ms that drawing a live frame took, smoothed */
     this.costMs = 0;
@@ -93,6 +95,7 @@ export class Stage {
     if (!due && !this.layers.some((one) => one.dirty)) return;
     this.seenVersion = this.viewport.version;
     const start = performance.now();
+    const errors = this.errors;
     if (due) {
       this.lastLiveMs = nowMs;
       this.frames += 1;
@@ -110,6 +113,7 @@ export class Stage {
         layer.draw(context, start);
       });
     }
+    if (due) this.failing = this.errors > errors ? this.failing + 1 : 0;
     if (due) this.costMs += 0.1 * (performance.now() - start - this.costMs);
   }
 

@@ -3,7 +3,9 @@
 import { clock } from '../model/format.js';
 import { byId, setText } from './dom.js';
 
-/** @typedef {'ok'|'late'|'lost'|'starting'} Health */
+/** @typedef {'ok'|'late'|'lost'|'starting'|'fault'} Health */
+
+const FAULT_FRAMES = 5;
 
 /**
  * @param {number} nowMs @param {number} lastMessageMs @param {number} lastPictureMs local clock of the newest tracks
@@ -20,6 +22,7 @@ export function healthOf(nowMs, lastMessageMs, lastPictureMs, periodS, startMs =
 
 /** @param {Health} health @param {number} age s, of the picture @param {string} link @returns {string} */
 function bannerText(health, age, link) {
+  if (health === 'fault') return 'DISPLAY FAULT – part of the picture cannot be drawn, do not use it; reload the page';
   if (health === 'late') return Number.isFinite(age) ? `PICTURE LATE – no new tracks for ${Math.round(age)} s` : 'PICTURE LATE – connected, but no tracks yet';
   if (health !== 'lost') return '';
   const again = link === 'live' ? '' : ' – reconnecting…';
@@ -41,10 +44,12 @@ export class StatusBar {
 
   /**
    * @param {import('../feed/picture.js').PictureState} picture @param {import('../feed/live.js').LiveFeed} feed
-   * @param {import('../feed/live.js').LinkState} link @param {number} nowMs
+   * @param {import('../feed/live.js').LinkState} link @param {number} failing frames in a row that could not be drawn
+   * @param {number} nowMs
    */
-  update(picture, feed, link, nowMs) {
-    const health = healthOf(nowMs, feed.lastMessageMs, picture.timeMs, feed.periodS, this.startMs);
+  update(picture, feed, link, failing, nowMs) {
+    const found = healthOf(nowMs, feed.lastMessageMs, picture.timeMs, feed.periodS, this.startMs);
+    const health = found !== 'lost' && failing >= FAULT_FRAMES ? 'fault' : found;
     this.health = health;
     const age = (nowMs - picture.timeMs) / 1000;
     setText(this.utc, clock(picture.time));

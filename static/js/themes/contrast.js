@@ -6,7 +6,7 @@ export const contrast = {
   css: {
     '--ground': '#000000', '--panel': '#000000', '--panel-2': '#111111', '--edge': '#8a8a8a', '--edge-strong': '#ffffff',
     '--text': '#ffffff', '--text-strong': '#ffffff', '--text-dim': '#d8d8d8', '--accent': '#5ec8ff', '--accent-ink': '#000000',
-    '--ok': '#4fe0c0', '--info': '#ffd400', '--info-ink': '#000000', '--info-soft': '#332b00', '--alarm': '#ff3b3b',
+    '--ok': '#4fe0c0', '--info': '#ffd400', '--info-text': '#ffd400', '--info-ink': '#000000', '--info-soft': '#332b00', '--alarm': '#ff3b3b',
     '--alarm-ink': '#000000', '--alarm-soft': '#4a0000', '--focus': '#ffffff', '--shadow': 'rgba(0,0,0,.8)', '--sim': '#e0b0ff',
   },
   map: {

@@ -6,7 +6,7 @@ export const day = {
   css: {
     '--ground': '#dfe5e6', '--panel': '#f3f6f7', '--panel-2': '#e6ecee', '--edge': '#c6d0d5', '--edge-strong': '#9aa9b2',
     '--text': '#24313a', '--text-strong': '#0b141a', '--text-dim': '#51616c', '--accent': '#0b5f96', '--accent-ink': '#ffffff',
-    '--ok': '#1b7350', '--info': '#e09a00', '--info-ink': '#1d1402', '--info-soft': '#fbeecb', '--alarm': '#cf1f24',
+    '--ok': '#1b7350', '--info': '#e09a00', '--info-text': '#835000', '--info-ink': '#1d1402', '--info-soft': '#fbeecb', '--alarm': '#cf1f24',
     '--alarm-ink': '#ffffff', '--alarm-soft': '#fbdcdc', '--focus': '#0b5f96', '--shadow': 'rgba(30,45,55,.25)', '--sim': '#5b459c',
   },
   map: {

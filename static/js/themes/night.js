@@ -6,7 +6,7 @@ export const night = {
   css: {
     '--ground': '#0a0e12', '--panel': '#10161c', '--panel-2': '#161e26', '--edge': '#232e38', '--edge-strong': '#34424f',
     '--text': '#c6d1da', '--text-strong': '#eaf1f6', '--text-dim': '#8796a3', '--accent': '#6fb7e8', '--accent-ink': '#08131c',
-    '--ok': '#6fbf9b', '--info': '#f2b441', '--info-ink': '#1d1402', '--info-soft': '#2b2412', '--alarm': '#f0484a',
+    '--ok': '#6fbf9b', '--info': '#f2b441', '--info-text': '#f2b441', '--info-ink': '#1d1402', '--info-soft': '#2b2412', '--alarm': '#f0484a',
     '--alarm-ink': '#ffffff', '--alarm-soft': '#3a1518', '--focus': '#9fd4ff', '--shadow': 'rgba(0,0,0,.5)', '--sim': '#a99bd6',
   },
   map: {
