@@ -62,7 +62,8 @@ def nullable(values: NDArray[Any], decimals: int) -> list[float | None]:
 
 def degrees(values: NDArray[Any]) -> NDArray[np.float64]:
     """Radians as degrees in [0, 360), rounded to a tenth first so that 360.0 does not appear."""
-    return np.mod(np.round(np.rad2deg(values.astype(np.float64)), 1), 360.0)
+    with np.errstate(invalid="ignore"):
+        return np.mod(np.round(np.rad2deg(values.astype(np.float64)), 1), 360.0)
 
 
 class Wire:

@@ -11,6 +11,7 @@ from fastapi import APIRouter, FastAPI, WebSocket
 from starlette.responses import Response
 
 from app.api import models, problems
+from app.api.asyncapi import document as asyncapi_document
 from app.api.context import Context, answer
 from app.api.intake import intake_router
 from app.api.metrics import metrics_router
@@ -20,7 +21,6 @@ from app.api.readsb import readsb_router
 from app.api.surveillance import surveillance_router
 from app.api.video import video_router
 from app.contract import Service
-from app.live.asyncapi import document as asyncapi_document
 from app.live.hub import Hub
 from app.live.session import serve
 from app.wire import Wire

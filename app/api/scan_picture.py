@@ -22,8 +22,8 @@ PALETTES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
 }
 """Colours of the weakest and the strongest echo."""
 
-ABOVE_NOISE = 12
-"""Steps above the median amplitude at which echoes become visible when no floor is asked for."""
+ABOVE_NOISE_DB = 9.0
+"""Decibels above the median amplitude at which echoes become visible when no floor is asked for."""
 
 TABLES = 8
 PICTURES = 32
@@ -84,7 +84,8 @@ class ScanPictures:
         amplitude = video.amplitude[:, : cells * pool].reshape(len(video.amplitude), cells, pool).max(axis=2)
         flat = np.append(amplitude.ravel(), np.uint8(0))
         if floor is None:
-            floor = min(254, int(np.median(video.amplitude[::16, ::4])) + ABOVE_NOISE)
+            noise = float(np.median(amplitude[::16, ::4]))
+            floor = min(254, int(noise + ABOVE_NOISE_DB / site.video.db_per_step))
         image = Image.fromarray(flat[table])
         image.putpalette(_palette(palette, floor))
         opacity = np.clip((np.arange(256) - floor) * 3 + 60, 0, 255)

@@ -131,7 +131,8 @@ class Client:
                 async with asyncio.timeout(heartbeat):
                     await self._event.wait()
             except TimeoutError:
-                await self._put(self.hub.heartbeat_text(self.place if "tracks" in self.topics else self.hub.seq))
+                in_step = self.topics and "tracks" not in self.topics
+                await self._put(self.hub.heartbeat_text(self.hub.seq if in_step else self.place))
                 continue
             self._event.clear()
             await self._flush()
@@ -159,11 +160,11 @@ class Client:
     async def _put_snapshots(self) -> None:
         self._snapshot = self._due = False
         view = self._view
-        if "alerts" in self.topics:
-            await self._put(self.hub.alerts_snapshot())
         if view is not None and "tracks" in self.topics:
             self.place = self.hub.stream.seq
             await self._put(self.hub.snapshot_text(view))
+        if "alerts" in self.topics:
+            await self._put(self.hub.alerts_snapshot())
 
     async def _put_delta(self, view: View) -> None:
         self._due = False

@@ -54,6 +54,7 @@ class Hub:
         self._watch: asyncio.Task[None] | None = None
         self._alerts: deque[tuple[int, float, str]] = deque()
         self._last_tick: dict[float, float] = {}
+        self._later: dict[float, asyncio.TimerHandle] = {}
         self._deltas: dict[tuple[TrackFilter, int], str] = {}
         self._snapshots: dict[TrackFilter, str] = {}
         self._document: tuple[int, bytes] | None = None
@@ -92,6 +93,8 @@ class Hub:
         """Close all clients (1001, going away) and end."""
         with self._lock:
             self._loop = None
+        for timer in self._later.values():
+            timer.cancel()
         if self._watch is not None:
             self._watch.cancel()
             with contextlib.suppress(asyncio.CancelledError):
@@ -249,12 +252,19 @@ class Hub:
             if now - last >= 0.9 / rate:
                 self._last_tick[rate] = max(last + 1.0 / rate, now - 1.0 / rate)
                 due.add(rate)
+            elif rate not in self._later:  # too early: should no later picture come, this one is still sent
+                wait = last + 1.0 / rate - now
+                self._later[rate] = asyncio.get_running_loop().call_later(wait, self._tick_late, rate)
         if not due:
             return
         self._follow(now)
         for client in self.clients:
             if client.rate_hz in due and "tracks" in client.topics:
                 client.due()
+
+    def _tick_late(self, rate: float) -> None:
+        self._later.pop(rate, None)
+        self._tick(self.loop_time())
 
     def _follow(self, now: float) -> None:
         """Bring the rows up to the newest picture: only when somebody is due, so idle pictures cost nothing."""

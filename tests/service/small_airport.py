@@ -6,8 +6,8 @@ import math
 from typing import Any
 
 import numpy as np
+from shapely import transform
 from shapely.geometry import LineString, Point, box, mapping
-from shapely.ops import transform
 
 from pipeline.airport.frame import LocalFrame
 from pipeline.airport.model import Airport, Feature, HoldingPosition, Runway, RunwayEnd, TaxiGraph
@@ -50,9 +50,9 @@ def small_airport() -> Airport:
 def as_geojson(airport: Airport) -> dict[str, Any]:
     """The features in WGS 84, longitude first."""
 
-    def to_degrees(east: Any, north: Any) -> tuple[Any, Any]:
-        latitude, longitude = airport.frame.to_geodetic(np.asarray(east), np.asarray(north))
-        return longitude, latitude
+    def to_degrees(points: Any) -> Any:
+        latitude, longitude = airport.frame.to_geodetic(points[:, 0], points[:, 1])
+        return np.column_stack([longitude, latitude])
 
     return {
         "type": "FeatureCollection",
@@ -61,7 +61,7 @@ def as_geojson(airport: Airport) -> dict[str, Any]:
                 "type": "Feature",
                 "id": one.id,
                 "properties": {"kind": one.kind, "name": one.name},
-                "geometry": mapping(transform(to_degrees, one.geometry)),
+                "geometry": mapping(transform(one.geometry, to_degrees)),
             }
             for one in airport.features
         ],
