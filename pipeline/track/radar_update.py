@@ -175,8 +175,8 @@ def _hit(
     table = core.table
     take(core, rows, plots.time[taken], position, noise[taken], Source.RADAR)
     reshape(
-        core.settings.shape, rows, table.state, shape, plots.bearing_sd[taken], table.length, table.width,
-        table.heading, table.axis, table.moving, table.shapes,
+        core.settings.shape, rows, table.state, table.covariance, table.moved, shape, plots.bearing_sd[taken],
+        table.length, table.width, table.heading, table.axis, table.moving, table.shapes,
     )  # fmt: skip
     speed = np.hypot(table.state[rows, 2], table.state[rows, 3])
     table.category[rows] = core.classify(

@@ -16,7 +16,9 @@ from pipeline.track.contracts import Array, Floats
 class ShapeRule:
     """grow, shrink: part of a longer or shorter extent taken per plot (a target hides more easily than it grows).
 
-    start_speed, stop_speed: m/s above and below which a course gives the heading. reverse_speed: up to it a target
+    start_speed, stop_speed: m/s above and below which a course gives the heading; to start, the speed must also be
+    `sure` times its own standard deviation, and the target must have come away from where it was first seen.
+    reverse_speed: m/s, up to which a target
     may move backwards (push-back). bearing_sd: rad, plots less sure of their long axis do not turn the heading.
     """
 
@@ -24,6 +26,7 @@ class ShapeRule:
     shrink: float = 0.1
     start_speed: float = 2.5
     stop_speed: float = 1.2
+    sure: float = 3.0
     reverse_speed: float = 4.0
     bearing_sd: float = 0.25
 
@@ -66,14 +69,14 @@ def oriented_noise(noise: Floats, extent: Floats, part: float) -> Floats:
 
 
 def reshape(
-    rule: ShapeRule, rows: Array, state: Array, plot: Floats, bearing_sd: Array, length: Array, width: Array,
-    heading: Array, axis: Array, moving: Array, shapes: Array,
+    rule: ShapeRule, rows: Array, state: Array, covariance: Array, moved: Array, plot: Floats, bearing_sd: Array,
+    length: Array, width: Array, heading: Array, axis: Array, moving: Array, shapes: Array,
 ) -> None:  # fmt: skip
     """Smooth extent and heading of the tracks `rows` with the plot (k, 3) each took; the columns are changed."""
     settings = np.array([
-        rule.grow, rule.shrink, rule.start_speed, rule.stop_speed, rule.reverse_speed, rule.bearing_sd
+        rule.grow, rule.shrink, rule.start_speed, rule.stop_speed, rule.reverse_speed, rule.bearing_sd, rule.sure
     ])  # fmt: skip
-    _reshape(settings, rows, state, plot, bearing_sd, length, width, heading, axis, moving, shapes)
+    _reshape(settings, rows, state, covariance, moved, plot, bearing_sd, length, width, heading, axis, moving, shapes)
 
 
 @njit(nogil=True, cache=True)
@@ -90,15 +93,16 @@ def _turn(a: float, b: float) -> float:
 
 @njit(nogil=True, cache=True)
 def _reshape(
-    rule: Floats, rows: Array, state: Floats, plot: Floats, bearing_sd: Array, length: Floats, width: Floats,
-    heading: Floats, axis: Floats, moving: Array, shapes: Array,
+    rule: Floats, rows: Array, state: Floats, cov: Floats, moved: Array, plot: Floats, bearing_sd: Array,
+    length: Floats, width: Floats, heading: Floats, axis: Floats, moving: Array, shapes: Array,
 ) -> None:  # fmt: skip
     for k in range(len(rows)):
         i = rows[k]
         long, short, bearing = plot[k, 0], plot[k, 1], plot[k, 2]
         sure = math.isfinite(bearing) and (not math.isfinite(bearing_sd[k]) or bearing_sd[k] <= rule[5])
         speed = math.hypot(state[i, 2], state[i, 3])
-        moving[i] = speed > (rule[3] if moving[i] else rule[2])
+        noise = math.sqrt(0.5 * (cov[i, 2, 2] + cov[i, 3, 3]))
+        moving[i] = moved[i] and speed > (rule[3] if moving[i] else max(rule[2], rule[6] * noise))
         if sure:
             if not math.isfinite(axis[i]):
                 axis[i] = bearing % math.pi

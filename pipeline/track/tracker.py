@@ -114,7 +114,7 @@ class Tracker:
             covariance=covariance,
             length=np.where(table.shapes[rows] > 0, table.length[rows], np.nan),
             width=np.where(table.shapes[rows] > 0, table.width[rows], np.nan),
-            heading=np.where(np.isfinite(table.heading[rows]), table.heading[rows], _course(state)),
+            heading=np.where(table.shapes[rows] > 0, table.heading[rows], _course(state)),
             sources=sources,
             simulated=table.simulated[rows],
             zone=core.zones.zone(state[:, 0], state[:, 1]),
