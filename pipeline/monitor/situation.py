@@ -34,7 +34,8 @@ class SituationSettings:
     deep in the protection area a target must be, at least and in standard deviations of its position, and at most.
     braking: m/s^2 that a mobile could brake with before the area. together_m, together_speed: a pair so close with so
     little relative speed is a tow, an escort or one target seen twice. lead_s: a fast track is carried on to the time
-    of the picture by at most this.
+    of the picture by at most this. mover_hits, mover_sd: a track counts as arriving or rolling only after so many
+    measurements, and when its speed is so many standard deviations: new tracks have wild speeds.
     """
 
     arrival_speed: float = 25.0
@@ -57,6 +58,8 @@ class SituationSettings:
     together_m: float = 60.0
     together_speed: float = 4.0
     lead_s: float = 2.0
+    mover_hits: int = 4
+    mover_sd: float = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +155,8 @@ def observe(
     known_height = np.isfinite(tracks.altitude)
     height = np.where(known_height, tracks.altitude, 0.0)
     usable = (tracks.phase != TrackPhase.TENTATIVE) | ((tracks.sources & (Source.NODE | Source.REPORT)) != 0)
-    credible = usable & ((tracks.category != TargetClass.VEHICLE) | (speed > s.vehicle_speed))
+    steady = (tracks.hits >= s.mover_hits) & (speed > s.mover_sd * _largest_deviation(tracks.covariance[:, 2:, 2:]))
+    credible = usable & steady & ((tracks.category != TargetClass.VEHICLE) | (speed > s.vehicle_speed))
 
     along, across = frames.project(position)
     speed_along, speed_across = frames.resolve(velocity)

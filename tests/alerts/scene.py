@@ -91,7 +91,9 @@ def tracks_at(movers: list[Mover], time: float, noise: np.random.Generator | Non
             "sources": Source.RADAR,
         }.items()
     }
-    covariance = np.stack([np.diag([m.extra.get("sd", 2.0) ** 2] * 2 + [0.5, 0.5]) for m, _ in rows])
+    covariance = np.stack(
+        [np.diag([m.extra.get("sd", 2.0) ** 2] * 2 + [m.extra.get("speed_sd", 0.7) ** 2] * 2) for m, _ in rows]
+    )
     return Tracks.build(
         len(rows),
         id=[mover.id for mover, _ in rows],

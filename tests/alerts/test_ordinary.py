@@ -85,6 +85,12 @@ def test_a_tentative_track_on_the_runway_is_nothing_yet(watch: AlertMonitor) -> 
     assert play(watch, [arrival(1, 60), echo], 0, 130).changes == []
 
 
+@pytest.mark.parametrize("extra", [{"hits": 2}, {"speed_sd": 40.0}])
+def test_a_new_or_wild_track_does_not_count_as_rolling(watch: AlertMonitor, extra: dict[str, float]) -> None:
+    wild = Mover(7, [(0, -1000, 0), (20, 400, 5)], TargetClass.UNKNOWN, dict(extra))
+    assert play(watch, [wild, parked(3, 800, 0)], 0, 15).changes == []
+
+
 def test_a_vague_track_near_the_edge_of_the_area(watch: AlertMonitor) -> None:
     vague = parked(3, 0, -78, TargetClass.UNKNOWN, sd=15.0)
     assert play(watch, [arrival(1, 60), vague], 0, 90).changes == []
