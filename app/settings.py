@@ -88,7 +88,7 @@ class PartSettings(BaseModel):
 class PartsSettings(Section):
     """The methods, one a stage; `airside parts` lists them with their settings."""
 
-    detect: PartSettings = PartSettings(name="hybrid")
+    detect: PartSettings = PartSettings(name="adaptive")
     extract: PartSettings = PartSettings(name="manhattan")
     associate: PartSettings = PartSettings(name="gnn")
     filter: PartSettings = PartSettings(name="kalman")

@@ -1,0 +1,438 @@
+"""Adaptive CFAR: a short-memory level of each patch of ground, a long-memory offset of each cell, a spread.
+
+Ours. It starts from the observation that the Hybrid CFAR (`pipeline.detect.hybrid`) holds its false alarm rate only
+where a macro-cell is homogeneous and its clutter Rayleigh. The threshold of a cell is
+
+    level(patch) + offset(cell) + mu * spread(patch) / spread(Rayleigh)
+
+* A patch is a macro-cell cut by the surface kinds of the map. Its level is the mean of (log amplitude - offset) without
+  what stands out, remembered for little more than a scan, so that rain is followed.
+* The offset is the cell's own texture, remembered for a minute and more, not learned from what stands out, and bounded
+  on the pavement, so that a target that stands still is never learned away.
+* The spread is the standard deviation of what is left. Weibull clutter is a location-scale family in the log domain, so
+  the false alarm rate holds for every Weibull shape.
+* Cells beside a border of surface kinds, and buildings, are patches of their own with wide bounds: a clutter map, whose
+  level follows only the changes of the ground about it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter, minimum_filter
+
+from pipeline.detect.calibration import LOG_MEAN_DB, estimation_loss_db, threshold_offset_db
+from pipeline.kernels.bits import bits_above, count_runs
+from pipeline.kernels.run_cap import CapSettings, fit_row
+from pipeline.state import ArrayState, read_only, remembered
+from pipeline.tables import Detections, Sweeps, VideoFormat
+
+ONE = 128
+"""Units of an offset in one step of the log amplitude."""
+
+EDGE = 8
+"""Added to the surface kind of a cell beside a border."""
+
+FEWEST = 150
+"""A patch with fewer cells is put together with the same kind in a larger macro-cell."""
+
+GRASS, BUILDING = 0, 4
+"""Surface kinds with bounds of their own; see `pipeline.airport.model.SurfaceKind`."""
+
+LEARN_EVERY = 4
+"""Once the start is over, a row learns in every fourth scan."""
+
+START_SCANS = 30
+"""For so long grass, borders and buildings learn from everything, also from what stands out."""
+
+
+@dataclass(eq=False, kw_only=True)
+class AdaptiveState(ArrayState):
+    """offset: of each cell, in 1/128 step. level, spread, bias: of each patch, in steps. The rest: see the kernel."""
+
+    azimuths: int
+    rule: tuple[float, ...]
+    run_at: NDArray[np.int64]
+    run_first: NDArray[np.int64]
+    run_patch: NDArray[np.int64]
+    macro: NDArray[np.int64]
+    bounds: NDArray[np.int32]
+    wide: NDArray[np.bool_]
+    soft: NDArray[np.bool_]
+    row_limits: NDArray[np.uint8]
+    tail: NDArray[np.uint8]
+    offset: NDArray[np.int16] = remembered()
+    level: NDArray[np.float64] = remembered()
+    spread: NDArray[np.float64] = remembered()
+    bias: NDArray[np.float64] = remembered()
+    base: NDArray[np.int32] = remembered()
+    sums: NDArray[np.float64] = remembered()
+    scans: NDArray[np.int64] = remembered()
+    budget: NDArray[np.float64] = remembered()
+    degraded_sweeps: NDArray[np.int64] = remembered()
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """degraded_sweeps: sweeps whose threshold was raised to stay under the cap on runs."""
+        return {"degraded_sweeps": int(self.degraded_sweeps[0])}
+
+
+@dataclass(frozen=True)
+class Adaptive:
+    """See the module. The first `learn_scans` scans only learn: a false alarm in each of a million cells of unlearned
+    texture would be thousands; what stands on the pavement meanwhile is not learned away.
+
+    pfa: false alarm probability in Rayleigh and Weibull clutter. macro_cell_m: side of the macro-cells. level_scans:
+    memory of the levels. offset_scans: memory of the offsets once the start is over; it begins with a sixth of it.
+    spread_scans: memory of the spreads. most_offset_db: how far a pavement cell may be learned up; grass_offset_db: the
+    same for grass. margin_db: what comes this near to the threshold is not learned. max_runs: as in `hybrid`.
+    """
+
+    pfa: float = 1e-6
+    macro_cell_m: float = 100.0
+    level_scans: float = 1.7
+    offset_scans: int = 64
+    spread_scans: float = 30.0
+    most_offset_db: float = 8.0
+    grass_offset_db: float = 16.0
+    margin_db: float = 3.5
+    learn_scans: int = 12
+    max_runs: int = 40_000
+
+    def __post_init__(self) -> None:
+        if not 0 < self.pfa < 0.5:
+            raise ValueError("pfa must lie between 0 and 0.5")
+        if not self.macro_cell_m > 0:
+            raise ValueError("macro_cell_m must be greater than 0")
+        if (
+            self.level_scans < 1
+            or self.offset_scans < 12
+            or self.spread_scans < 1
+            or min(self.learn_scans, self.max_runs) < 1
+        ):
+            raise ValueError("scans and max_runs must be 1 or more, offset_scans 12 or more")
+
+    def start(self, video: VideoFormat, surface: NDArray[np.uint8] | None = None) -> AdaptiveState:
+        """The state before the first sweep. Without a map all is one surface kind."""
+        shape = (video.azimuths, video.ranges)
+        if surface is None:
+            surface = np.full(shape, 2, np.uint8)
+        if surface.shape != shape:
+            raise ValueError(f"surface must be {shape}, not {surface.shape}")
+        patch, kind, macro = _patches(video, surface, self.macro_cell_m)
+        run_at, run_first, run_patch = _runs(patch)
+        step = video.db_per_step
+        offset_db = threshold_offset_db(self.pfa, step)
+        gain = 1.0 / self.offset_scans
+        mu = offset_db + estimation_loss_db(self.pfa, step) * gain / (2 - gain)
+        patches = len(kind)
+        missing_db, spread_db = _truncated_db(offset_db - self.margin_db)
+        rayleigh = spread_db / step
+        return AdaptiveState(
+            azimuths=video.azimuths,
+            rule=(
+                (mu + missing_db) / step,
+                rayleigh,
+                self.margin_db / step,
+                1.0 / self.level_scans,
+                1.0 / self.spread_scans,
+                float(self.offset_scans),
+                12.0 / step,
+                7.0 / step,
+                float(self.learn_scans),
+            ),
+            run_at=run_at,
+            run_first=run_first,
+            run_patch=run_patch,
+            macro=macro,
+            bounds=self._bounds(kind, step),
+            wide=(kind >= EDGE) | (kind == BUILDING),
+            soft=(kind >= EDGE) | (kind == BUILDING) | (kind == GRASS),
+            row_limits=np.full(64 * video.words, 255, np.uint8),
+            tail=np.zeros(64, np.uint8),
+            offset=np.zeros(shape, np.int16),
+            level=np.zeros(patches),
+            spread=np.full(patches, rayleigh),
+            bias=np.zeros(patches),
+            base=np.full(patches, 10_000, np.int32),
+            sums=np.zeros((patches, 4)),
+            scans=np.array([-1, 0], np.int64),
+            budget=np.array([CapSettings.of(self.max_runs, video.azimuths).depth]),
+            degraded_sweeps=np.zeros(1, np.int64),
+        )
+
+    def __call__(self, sweeps: Sweeps, state: AdaptiveState) -> Detections:
+        """The detections of the block."""
+        mask = np.zeros((len(sweeps), (sweeps.amplitude.shape[1] + 63) // 64), np.uint64)
+        before = int(state.degraded_sweeps[0])
+        cap = CapSettings.of(self.max_runs, state.azimuths)
+        _detect(
+            read_only(sweeps.amplitude),
+            read_only(sweeps.row, np.int64),
+            sweeps.scan,
+            mask,
+            state.rule,
+            (state.run_at, state.run_first, state.run_patch, state.macro, state.bounds, state.wide, state.soft),
+            (state.offset, state.level, state.spread, state.bias, state.base, state.sums, state.scans),
+            (cap.refill, cap.depth, state.budget, state.degraded_sweeps),
+            state.row_limits,
+            state.tail,
+        )
+        return Detections(mask, degraded=int(state.degraded_sweeps[0]) > before)
+
+    def _bounds(self, kind: NDArray[np.int64], step: float) -> NDArray[np.int32]:
+        """(patches, 2) least and greatest offset in 1/128 step."""
+        most = np.full(len(kind), self.most_offset_db)
+        most[kind == GRASS] = self.grass_offset_db
+        most[kind >= EDGE] = 22.0
+        most[kind == BUILDING] = 30.0
+        least = np.where(kind >= EDGE, -22.0, -20.0)
+        return np.rint(np.stack([least, most], axis=1) * ONE / step).astype(np.int32)
+
+
+PART = Adaptive
+
+
+def _patches(
+    video: VideoFormat, surface: NDArray[np.uint8], size_m: float
+) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.int64]]:
+    """(azimuths, ranges) patch of each cell; kind (EDGE added) and macro-cell of each patch."""
+    least = minimum_filter(surface, size=5, mode=("wrap", "nearest"))
+    border = least != maximum_filter(surface, size=5, mode=("wrap", "nearest"))
+    kind = surface.astype(np.int64) + EDGE * (border & (surface != BUILDING))
+    macro = _macro_cells(video, size_m)
+    patch = np.full(surface.shape, -1, np.int64)
+    sizes = (size_m, 3 * size_m, 10 * size_m, np.inf)
+    for size in sizes:
+        left = patch < 0
+        if not left.any():
+            break
+        key = _macro_cells(video, size)[left] * (2 * EDGE) + kind[left]
+        _, inverse, counts = np.unique(key, return_inverse=True, return_counts=True)
+        good = (counts >= FEWEST)[inverse] if np.isfinite(size) else np.ones(len(inverse), bool)
+        patch[left] = np.where(good, inverse + patch.max() + 1, -1)
+    _, first, named = np.unique(patch, return_index=True, return_inverse=True)
+    _, neighbourhood = np.unique(macro.ravel()[first], return_inverse=True)
+    return named.reshape(surface.shape).astype(np.int32), kind.ravel()[first], neighbourhood
+
+
+def _macro_cells(video: VideoFormat, size_m: float) -> NDArray[np.int64]:
+    """(azimuths, ranges) number of the nearly square macro-cell of each cell."""
+    if not np.isfinite(size_m):
+        return np.zeros((video.azimuths, video.ranges), np.int64)
+    distance = video.first_range_m + np.arange(video.ranges) * video.range_step_m
+    ring = (distance / size_m).astype(np.int64)
+    bands = np.maximum(np.rint(2 * np.pi * (ring + 0.5)), 1).astype(np.int64)
+    turn = np.arange(video.azimuths)[:, None] / video.azimuths
+    return np.asarray(ring * 100_000 + (turn * bands).astype(np.int64))
+
+
+def _runs(patch: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Runs of one patch along each row: first run of each row (rows + 1), first cell and patch of each run."""
+    starts = np.ones(patch.shape, bool)
+    starts[:, 1:] = patch[:, 1:] != patch[:, :-1]
+    row, cell = np.nonzero(starts)
+    run_at = np.zeros(len(patch) + 1, np.int64)
+    np.cumsum(np.bincount(row, minlength=len(patch)), out=run_at[1:])
+    return run_at, cell.astype(np.int64), patch[row, cell].astype(np.int64)
+
+
+@lru_cache(maxsize=16)
+def _truncated_db(limit_db: float) -> tuple[float, float]:
+    """How much the mean of log Rayleigh clutter loses when nothing is more than limit_db above it, and what spread is
+    left."""
+    power = -np.log1p(-(np.arange(200_000) + 0.5) / 200_000)
+    decibels = 10 * np.log10(power) - LOG_MEAN_DB
+    left = decibels[decibels <= limit_db]
+    return float(-left.mean()), float(left.std())
+
+
+@njit(nogil=True, cache=True)
+def _detect(
+    amplitude: Any,
+    rows: Any,
+    scan: int,
+    mask: Any,
+    rule: Any,
+    layout: Any,
+    memory: Any,
+    cap: Any,
+    limits: Any,
+    tail: Any,
+) -> None:
+    run_at, run_first, run_patch = layout[0], layout[1], layout[2]
+    offset, base, scans = memory[0], memory[4], memory[6]
+    refill, depth, budget, degraded = cap
+    n, ranges = amplitude.shape
+    words = mask.shape[1]
+    whole = ranges // 64
+    limits_at, tail_at = limits.ctypes.data, tail.ctypes.data
+    for i in range(n):
+        if scan != scans[0]:
+            if scans[0] >= 0:
+                _finish_scan(rule, layout, memory)
+                scans[1] += 1
+            scans[0] = scan
+        row = rows[i]
+        cells = amplitude[i]
+        own = offset[row]
+        for k in range(run_at[row], run_at[row + 1]):
+            end = run_first[k + 1] if k + 1 < run_at[row + 1] else ranges
+            _limit(own[run_first[k] : end], base[run_patch[k]], limits[run_first[k] : end])
+        bits = mask[i]
+        row_at = cells.ctypes.data
+        anything = np.uint64(0)
+        for w in range(whole):
+            at = np.uintp(64 * w)
+            bits[w] = bits_above(row_at + at, limits_at + at)
+            anything |= bits[w]
+        if words > whole:
+            for j in range(ranges - 64 * whole):
+                tail[j] = cells[64 * whole + j]
+            bits[whole] = bits_above(tail_at, limits_at + np.uintp(64 * whole))
+            anything |= bits[whole]
+        budget[0] = min(budget[0] + refill, depth)
+        if scans[1] < rule[8]:
+            bits[:] = 0
+        elif anything:
+            runs = count_runs(bits)
+            if runs <= budget[0]:
+                budget[0] -= runs
+            else:
+                degraded[0] += 1
+                fit_row(cells, limits_at, bits, budget, tail)
+        if scans[1] < rule[5] or (scan + row) % LEARN_EVERY == 0:
+            _learn(cells, row, rule, layout, memory)
+
+
+@njit(nogil=True, cache=True)
+def _limit(own: Any, base: int, limits: Any) -> None:
+    for j in range(own.size):
+        limit = base + ((own[j] + ONE // 2) >> 7)
+        limits[j] = np.uint8(min(max(limit, 0), 255))
+
+
+@njit(nogil=True, cache=True)
+def _learn(cells: Any, row: int, rule: Any, layout: Any, memory: Any) -> None:
+    """Take one row into the sums of its patches, and let its offsets follow."""
+    _, rayleigh, margin, _, _, long, below, above, _ = rule
+    run_at, run_first, run_patch, _, bounds, _, soft = layout
+    offset, level, spread, bias, base, sums, scans = memory
+    own = offset[row]
+    age = np.float64(scans[1])
+    firm_gain = np.int32(8192 * max(1.0 / long, 1.0 / (age + 12.0))) if age > 0 else np.int32(0)
+    soft_gain = np.int32(8192 * max(1.0 / long, 1.0 / (age + 2.0))) if age > 0 else np.int32(0)
+    starting = age < START_SCANS
+    errors_within = (np.int32(-below * ONE), np.int32(above * ONE))
+    for k in range(run_at[row], run_at[row + 1]):
+        end = run_first[k + 1] if k + 1 < run_at[row + 1] else cells.size
+        p = run_patch[k]
+        total = sums[p]
+        open_wide = starting and soft[p]
+        _learn_run(
+            cells[run_first[k] : end],
+            own[run_first[k] : end],
+            (np.int32(level[p] * ONE), np.int32(bias[p] * ONE)),
+            (
+                np.int32((base[p] - margin * _scale(spread[p], rayleigh)) * ONE),
+                np.int32(2**30) if open_wide else np.int32(0),
+            ),
+            errors_within,
+            soft_gain if soft[p] else firm_gain,
+            (bounds[p, 0], bounds[p, 1]),
+            total,
+        )
+
+
+@njit(nogil=True, cache=True)
+def _learn_run(
+    cells: Any, own: Any, centre: Any, ceiling: Any, errors_within: Any, gain: Any, bounds: Any, total: Any
+) -> None:
+    # Without a branch and in 32 bits, so that the compiler makes it one loop of vectors.
+    middle, bias = centre
+    least_error, most_error = errors_within
+    least, most = bounds
+    ordinary, learnable = ceiling[0], ceiling[0] + ceiling[1]
+    count, first, errors = np.int32(0), np.int64(0), np.int64(0)
+    second = np.int64(0)
+    for j in range(own.size):
+        rest = (np.int32(cells[j]) << np.int32(7)) - np.int32(own[j])
+        apart = rest - middle
+        kept = np.int32(rest <= ordinary)
+        error = min(max(apart, least_error), most_error)
+        coarse = (apart >> np.int32(3)) * kept
+        count += kept
+        first += np.int64(apart * kept)
+        second += np.int64(coarse * coarse)
+        errors += np.int64(error * kept)
+        step = (((error - bias) * gain) >> np.int32(13)) * np.int32(rest <= learnable)
+        own[j] = np.int16(min(max(np.int32(own[j]) + step, least), most))
+    total[0] += count
+    total[1] += first
+    total[2] += 64.0 * second
+    total[3] += errors
+
+
+@njit(nogil=True, cache=True)
+def _finish_scan(rule: Any, layout: Any, memory: Any) -> None:
+    """Bring the patches up to date with the scan that is over."""
+    mu, rayleigh, level_gain, spread_gain = rule[0], rule[1], rule[3], rule[4]
+    macro, wide, soft = layout[3], layout[5], layout[6]
+    _, level, spread, bias, base, sums, scans = memory
+    young = scans[1] == 0
+    spread_gain = max(spread_gain, 1.0 / (scans[1] + 1.0))
+    changes = np.zeros((macro.max() + 1, 2))
+    for p in range(level.size):
+        count = sums[p, 0]
+        if count > 0:
+            moved = sums[p, 1] / count / ONE
+            variance = max(sums[p, 2] / count / ONE**2 - moved**2, 0.0)
+            if young:
+                level[p] += moved
+                if soft[p]:
+                    spread[p] = np.sqrt(variance)
+            else:
+                spread[p] += spread_gain * (np.sqrt(variance) - spread[p])
+                bias[p] += spread_gain * (sums[p, 3] / count / ONE - moved - bias[p])
+                if not wide[p]:
+                    level[p] += level_gain * moved
+                    changes[macro[p], 0] += level_gain * moved * count
+                    changes[macro[p], 1] += count
+        sums[p] = 0.0
+    for p in range(level.size):
+        if wide[p] and changes[macro[p], 1] > 0:
+            level[p] += changes[macro[p], 0] / changes[macro[p], 1]
+        base[p] = np.int32(np.floor(level[p] + mu * _scale(spread[p], rayleigh) + 0.5))
+    if young:
+        _start_wide(layout, memory)
+
+
+@njit(nogil=True, cache=True)
+def _scale(spread: float, rayleigh: float) -> float:
+    """How much wider than Rayleigh; the bounds are those of Weibull clutter worth following."""
+    return min(max(spread / rayleigh, 0.93), 1.75)
+
+
+@njit(nogil=True, cache=True)
+def _start_wide(layout: Any, memory: Any) -> None:
+    """Cells beside a border begin at the greatest level of their macro-cell, and come down to their own."""
+    run_at, run_first, run_patch, macro, bounds, wide, _ = layout
+    offset, level = memory[0], memory[1]
+    highest = np.zeros(macro.max() + 1)
+    for p in range(level.size):
+        highest[macro[p]] = max(highest[macro[p]], level[p])
+    for row in range(offset.shape[0]):
+        own = offset[row]
+        for k in range(run_at[row], run_at[row + 1]):
+            p = run_patch[k]
+            if not wide[p]:
+                continue
+            end = run_first[k + 1] if k + 1 < run_at[row + 1] else own.size
+            up = min(np.int64((highest[macro[p]] - level[p]) * ONE), np.int64(bounds[p, 1]))
+            for j in range(run_first[k], end):
+                own[j] = up

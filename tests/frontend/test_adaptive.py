@@ -1,0 +1,94 @@
+"""The adaptive detector: false alarm rate in homogeneous, Weibull and mixed clutter; targets that stand still stay."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.stats import binom
+
+from pipeline.detect import Detector
+from pipeline.detect.adaptive import Adaptive
+from pipeline.parts import build
+from pipeline.tables import Sweeps, VideoFormat
+from tests.frontend.contracts import DetectorContract
+
+VIDEO = VideoFormat(azimuths=256, ranges=256, range_step_m=3.0, beamwidth_rad=0.03)
+
+
+class TestAdaptiveKeepsTheContract(DetectorContract):
+    def make(self, **setting: Any) -> Detector:
+        part: Detector = build("detect", "adaptive", {"learn_scans": 1, **setting})
+        return part
+
+
+def scan(number: int, decibels: NDArray[np.float64]) -> Sweeps:
+    row = np.arange(VIDEO.azimuths, dtype=np.int32)
+    amplitude = np.clip(np.rint(decibels / VIDEO.db_per_step), 0, 255).astype(np.uint8)
+    return Sweeps(0, number, row, (row + 0.5) * VIDEO.azimuth_step_rad, number + row / VIDEO.azimuths, amplitude, True)
+
+
+def clutter(chance: np.random.Generator, shape: float = 2.0) -> NDArray[np.float64]:
+    """Log amplitude about 0 dB; shape: of the Weibull amplitude, 2 is Rayleigh."""
+    size = (VIDEO.azimuths, VIDEO.ranges)
+    return np.asarray(20 / shape * np.log10(chance.exponential(size=size)))
+
+
+@pytest.mark.parametrize(("shape", "factor"), [(2.0, 3), (1.6, 3), (1.2, 6)])
+def test_false_alarms_in_homogeneous_clutter_within_binomial_bounds(shape: float, factor: int) -> None:
+    chance = np.random.default_rng(1)
+    part = Adaptive(pfa=1e-4)
+    state = part.start(VIDEO)
+    found = cells = 0
+    for number in range(120):
+        mask = part(scan(number, 30 + clutter(chance, shape)), state).cells(VIDEO.ranges)
+        if number >= 80:
+            found, cells = found + int(mask.sum()), cells + mask.size
+    low, high = binom.ppf([0.001, 0.999], cells, 1e-4)
+    assert low / factor <= found <= factor * high
+
+
+def test_a_border_of_ground_makes_no_line_of_false_alarms() -> None:
+    chance = np.random.default_rng(2)
+    surface = np.full((VIDEO.azimuths, VIDEO.ranges), 2, np.uint8)
+    surface[:, 100:] = 0
+    level = np.where(np.arange(VIDEO.ranges) >= 101, 44.0, 30.0)  # the map is wrong by one cell
+    part = Adaptive(pfa=1e-5)
+    state = part.start(VIDEO, surface)
+    found = 0
+    for number in range(90):
+        mask = part(scan(number, level + clutter(chance)), state).cells(VIDEO.ranges)
+        if number >= 60:
+            found += int(mask[:, 96:106].sum())
+    assert found <= 30 * 256 * 10 * 1e-4
+
+
+@pytest.mark.parametrize("here_from_the_start", [True, False])
+def test_a_parked_aircraft_is_never_learned_away(here_from_the_start: bool) -> None:
+    chance = np.random.default_rng(3)
+    part = Adaptive()
+    state = part.start(VIDEO)
+    seen = []
+    for number in range(260):
+        decibels = 30 + clutter(chance)
+        if here_from_the_start or number >= 30:
+            decibels[100:108, 120:130] = 52 + 20 / 2 * np.log10(chance.gamma(2.0, 0.5, (8, 10)))
+        mask = part(scan(number, decibels), state).cells(VIDEO.ranges)
+        if number >= 200:
+            seen.append(mask[100:108, 120:130].mean())
+    assert np.mean(seen) > 0.85
+
+
+def test_rain_that_sets_in_makes_no_flood() -> None:
+    chance = np.random.default_rng(4)
+    part = Adaptive()
+    state = part.start(VIDEO)
+    worst = 0
+    for number in range(120):
+        rise = 13.0 * np.clip((number - 80) / 20, 0, 1)
+        mask = part(scan(number, 30 + rise + clutter(chance)), state).cells(VIDEO.ranges)
+        if number >= 80:
+            worst = max(worst, int(mask.sum()))
+    assert worst <= 10
