@@ -16,7 +16,7 @@ from pipeline.simulate.traffic import motion
 from pipeline.simulate.vehicles import along, distances
 
 Floats = NDArray[np.float64]
-STANDS_BEFORE = 22
+STANDS_BEFORE = 15
 """Seconds for which the vehicle stands beyond the hold before it moves."""
 
 
@@ -120,11 +120,13 @@ def _forward(threshold: Point, heading: float, place: Floats) -> float:
     return float((place[0] - threshold.x) * math.sin(heading) + (place[1] - threshold.y) * math.cos(heading))
 
 
-def intruder(way: Approach, time: float, number: int, speed: float = 8.0, stay: int = 9) -> Movement:
+def intruder(way: Approach, time: float, number: int, stay: int = 9) -> Movement:
     """The vehicle that passes the hold at `time`, stands just inside the runway's edge, and drives back.
 
     Time may be anything; the movement begins where it falls.
     """
+    # the longer the way, the faster: the next incident is due in a minute and a half
+    speed = min(max(8.0, way.line.length / 21.0), 13.0)
     out = distances(way.line.length, speed, 1.5)
     run = np.concatenate(
         [
@@ -132,7 +134,7 @@ def intruder(way: Approach, time: float, number: int, speed: float = 8.0, stay: 
             out,
             np.full(stay, way.line.length),
             way.line.length - distances(way.line.length, speed, 1.5),
-            np.zeros(10),
+            np.zeros(8),
         ]
     )
     passes = float(np.interp(way.before, run[: STANDS_BEFORE + len(out)], np.arange(STANDS_BEFORE + len(out))))
@@ -174,7 +176,7 @@ def choose(use: Use, ways: Sequence[Approach], number: int) -> Approach | None:
         return None
     if use.to_threshold == 0:
         return min(ahead, key=lambda way: way.along[use.end])
-    return ahead[number * 7 % len(ahead)]
+    return ahead[number % len(ahead)]
 
 
 def worth(use: Use, wanted: float) -> float:

@@ -12,7 +12,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 from shapely import STRtree
 from shapely.geometry import LineString
-from shapely.ops import unary_union
+from shapely.ops import substring, unary_union
 
 from pipeline.airport.model import Airport
 from pipeline.simulate.paths import Movement
@@ -142,11 +142,15 @@ def lap(
     for a, b in legs:
         runs += [a + np.sign(b - a) * distances(abs(b - a), speed, 1.2), np.full(int(rng.uniform(6.0, 45.0)), b)]
     once = np.concatenate(runs)
+    if len(once) > seconds:
+        # too long a way for the time: only its first part, there and back
+        part = LineString(substring(line, 0.0, 0.75, normalized=True).coords)
+        return lap(part, seconds, rng, speed, back=True)
     times = max(1, seconds // len(once))
     spare = seconds - times * len(once)
     # the time that is left over is spent standing at the end of each round
     rounds = [np.concatenate([once, np.full(spare // times + (i < spare % times), once[-1])]) for i in range(times)]
-    run = np.concatenate(rounds)[:seconds] if spare >= 0 else once[:seconds]
+    run = np.concatenate(rounds)
     return along(line, run, 1.0)
 
 

@@ -41,7 +41,7 @@ class VideoSimulator:
         start: float = 0.0,
         surface: NDArray[np.uint8] | None = None,
         law: PowerLaw | None = None,
-        noise_step: float = 64.0,
+        noise_step: float = 80.0,
         shadow_loss: float = 18.0,
         pulse_cells: float = 1.3,
         swerling: int = 3,

@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.airport.model import Airport
 from pipeline.simulate.incidents import Incident, Use, script, uses
+from pipeline.simulate.parked import parked
 from pipeline.simulate.paths import Movement, Paths, Truth
 from pipeline.simulate.recording import Recording, recorded_movements
 from pipeline.simulate.vehicles import vehicles
@@ -55,6 +56,7 @@ def build_world(
     first_incident: float = 45.0,
     incident_every: float = 90.0,
     vehicle_count: int = 14,
+    parked_count: int = 14,
 ) -> World:
     """The demonstration's world: begins where the recorded traffic has a conflict for the first incident."""
     movements = recorded_movements(recording)
@@ -64,7 +66,8 @@ def build_world(
     incidents = script(movements, airport, length, (offset + first_incident) % length, incident_every)
     everything = [
         *movements,
-        *vehicles(airport, recording.length, vehicle_count, seed),
+        *parked(airport, movements, length, parked_count, seed),
+        *vehicles(airport, length, vehicle_count, seed),
         *(one.vehicle for one in incidents),
         *(one.arrival for one in incidents if one.arrival is not None),
     ]
