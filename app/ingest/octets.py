@@ -28,6 +28,7 @@ from __future__ import annotations
 
 import math
 import struct
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -100,6 +101,26 @@ def decode_sweeps(
             )
         )
     return blocks, {"taken": header.sweeps}
+
+
+class OctetIntake:
+    """decode_sweeps for one radar over many bodies, with turns numbered here.
+
+    A sender that starts again, or numbers wildly, then only begins the next turn: its own number would put the chain
+    behind or far ahead of everything that follows. Bodies of one number whose rows go on belong to one turn.
+    """
+
+    def __init__(self, site: RadarSite, index: int, blocks_per_scan: int = 32) -> None:
+        self._site, self._index, self._blocks = site, index, blocks_per_scan
+        self._theirs, self._own, self._row = -1, -1, -1
+
+    def take(self, body: bytes) -> tuple[list[Sweeps], dict[str, int]]:
+        """The blocks in a body and {"taken": sweeps}. Raises Refused, taking nothing."""
+        blocks, counted = decode_sweeps(body, self._site, self._index, self._blocks)
+        if blocks[0].scan != self._theirs or int(blocks[0].row[0]) <= self._row:
+            self._own += 1
+        self._theirs, self._row = blocks[0].scan, int(blocks[-1].row[-1])
+        return [replace(one, scan=self._own) for one in blocks], counted
 
 
 def _row_type(cells: int) -> np.dtype[np.void]:

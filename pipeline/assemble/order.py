@@ -211,17 +211,12 @@ def _fits(one, rules, counts):  # type: ignore[no-untyped-def]
 def _time(count, arrival, late, state, clock, counts):  # type: ignore[no-untyped-def]
     """UTC of the message; nan when it is not to be taken."""
     if count < 0:
-        time = arrival
         counts[NO_TIME] += 1
-    else:
-        time = np.floor(arrival / 86400) * 86400 + count / 128
-        if time - arrival > 43200:
-            time -= 86400
-        elif time - arrival < -43200:
-            time += 86400
     if state[HAVE] == 0:
-        return time
+        return _of_day(count, arrival, arrival)
     last = clock[LAST_TIME]
+    # the day goes on from the message before, so that a recording may be replayed faster than time
+    time = _of_day(count, arrival, last + max(0.0, arrival - clock[LAST_ARRIVAL]))
     if late:
         if abs(time - last) > JUMP:
             counts[LATE] += 1
@@ -239,6 +234,19 @@ def _time(count, arrival, late, state, clock, counts):  # type: ignore[no-untype
     counts[CLOCK_STEP] += 1
     state[TIME_RUN] = 0
     state[NEW_SCAN] = 1
+    return _of_day(count, arrival, arrival)
+
+
+@njit(nogil=True, cache=True)
+def _of_day(count, arrival, near):  # type: ignore[no-untyped-def]
+    """UTC of a time of day: on the day that brings it next to `near`; the arrival when there is none."""
+    if count < 0:
+        return arrival
+    time = np.floor(near / 86400) * 86400 + count / 128
+    if time - near > 43200:
+        time -= 86400
+    elif time - near < -43200:
+        time += 86400
     return time
 
 

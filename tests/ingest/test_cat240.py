@@ -216,7 +216,7 @@ def mutations() -> st.SearchStrategy[bytes]:
     return st.tuples(whole, edits, st.integers(0, 11)).map(apply)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.binary(max_size=100) | mutations())
 def test_any_octets_are_read_or_refused(datagram: bytes) -> None:
     try:
@@ -226,7 +226,7 @@ def test_any_octets_are_read_or_refused(datagram: bytes) -> None:
     assert found
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.lists(st.binary(max_size=100) | mutations(), min_size=1, max_size=6))
 def test_the_batch_decoder_reads_the_same_as_the_clear_one(datagrams: list[bytes]) -> None:
     wanted: list[tuple[int, VideoMessage]] = []

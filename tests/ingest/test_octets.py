@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.contract import Refused
-from app.ingest.octets import decode_sweeps, encode_sweeps
+from app.ingest.octets import OctetIntake, decode_sweeps, encode_sweeps
 from pipeline.sites import RadarSite
 from pipeline.tables import Sweeps, VideoFormat
 
@@ -100,3 +100,12 @@ def test_another_radar_refuses_the_body() -> None:
     other = replace(SITE, video=replace(SITE.video, azimuths=64))
     with pytest.raises(Refused, match="radar smr has 10 and 64"):
         decode_sweeps(BODY, other, 0)
+
+
+def test_turns_are_numbered_here_whatever_the_sender_counts() -> None:
+    intake = OctetIntake(SITE, 3, 1)
+    sent = [(5, [0, 1]), (5, [2, 31]), (6, [0]), (4_000_000_000, [7]), (0, [9]), (0, [9]), (1, [1])]
+    scans = [intake.take(encode_sweeps(replace(block(rows), scan=scan), SITE))[0][0].scan for scan, rows in sent]
+    assert scans == [0, 0, 1, 2, 3, 4, 5]
+    with pytest.raises(Refused):
+        intake.take(b"")

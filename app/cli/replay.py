@@ -1,0 +1,183 @@
+"""`airside replay`: send a recording of radar video to the service, or look at its plots."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from app.ingest.recording import Recording
+    from app.settings import RadarSettings, Settings
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(replay)
+
+
+def replay(
+    file: Annotated[
+        Path, typer.Argument(help=".npz (scans, t), a folder of polar PNGs with a YAML, .pcap or .pcapng.")
+    ],
+    radar: Annotated[
+        str | None, typer.Option(help="Which radar of the settings it stands in for; the first if none.")
+    ] = None,
+    speed: Annotated[float, typer.Option(min=0.01, max=1000, help="So many times the recorded pace.")] = 1.0,
+    to: Annotated[
+        str | None, typer.Option(help="udp://host:port; the radar's own port on this machine if none.")
+    ] = None,
+    headless: Annotated[bool, typer.Option("--headless", help="Send nothing; print the plots of each turn.")] = False,
+    loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end.")] = False,
+    port: Annotated[int | None, typer.Option(min=1, max=65535, help="Take only this UDP port of a capture.")] = None,
+    settings: Annotated[
+        Path | None, typer.Option("--settings", "-s", envvar="AIRSIDE_SETTINGS", help="Settings of the service.")
+    ] = None,
+) -> None:
+    """Send a recording as ASTERIX CAT240 to a running service, as if the radar were turning now.
+
+    [bold]airside replay turns.npz[/bold] sends to the first radar of the settings on this machine;
+    [bold]airside replay turns.pcap --to udp://239.1.2.3:8600[/bold] to wherever you say;
+    [bold]airside replay turns.npz --headless[/bold] prints what the detector makes of it.
+    """
+    from rich.console import Console
+
+    from app.console import fail
+    from app.contract import Refused
+    from app.ingest.recordings import open_recording
+    from app.settings import SettingsError, load
+
+    console = Console()
+    try:
+        recording = open_recording(file, port=port)
+        _describe(console, recording)
+        loaded = load(settings)
+        if headless:
+            _print_plots(console, recording, loaded)
+        else:
+            address, chosen = _destination(loaded, radar, to)
+            if chosen is not None and to is None:
+                _must_fit(recording, chosen)
+            _send(console, recording, address, speed, loop)
+    except (Refused, SettingsError, OSError) as error:
+        raise fail(str(error)) from error
+    except KeyboardInterrupt:
+        raise typer.Exit(130) from None
+
+
+def _describe(console: Console, recording: Recording) -> None:
+    video = recording.site.video
+    turns = "" if recording.scans is None else f"{recording.scans} turns, "
+    console.print(
+        f"{recording.path}: {turns}{video.azimuths} azimuths of {video.ranges} cells of {video.range_step_m:.3g} m, "
+        f"a turn in {video.period_s:.3g} s",
+        highlight=False,
+    )
+
+
+def _destination(settings: Settings, radar: str | None, to: str | None) -> tuple[tuple[str, int], RadarSettings | None]:
+    from urllib.parse import urlsplit
+
+    from app.settings import SettingsError
+
+    names = {one.id: one for one in settings.radars}
+    if radar is not None and radar not in names:
+        raise SettingsError(f"no radar is called {radar!r}; there are: {', '.join(names) or 'none'}")
+    chosen = names[radar] if radar is not None else next(iter(names.values()), None)
+    if to is not None:
+        parts = urlsplit(to)
+        try:
+            if parts.scheme == "udp" and parts.hostname and parts.port:
+                return (parts.hostname, parts.port), chosen
+        except ValueError:
+            pass
+        raise SettingsError(f"--to {to}: must look like udp://127.0.0.1:8600")
+    if chosen is None:
+        return ("127.0.0.1", 8600), None
+    if chosen.udp is None or chosen.udp.port == 0:
+        raise SettingsError(f"radar {chosen.id} has no fixed UDP port; say where to send with --to")
+    host = chosen.udp.group or chosen.udp.address
+    return ("127.0.0.1" if host in ("0.0.0.0", "::") else host, chosen.udp.port), chosen
+
+
+def _must_fit(recording: Recording, radar: RadarSettings) -> None:
+    from app.settings import SettingsError
+
+    video = recording.site.video
+    fits = (video.azimuths, video.ranges) == (radar.azimuths, radar.ranges)
+    if not fits or abs(video.range_step_m / radar.range_step_m - 1) * video.ranges > 0.5:
+        raise SettingsError(
+            f"radar {radar.id} is set to {radar.azimuths} azimuths of {radar.ranges} cells of {radar.range_step_m:g} m "
+            f"and would refuse this recording: set azimuths = {video.azimuths}, ranges = {video.ranges}, "
+            f"range_step_m = {video.range_step_m:.6g}, first_range_m = {video.first_range_m:.6g}, "
+            f"period_s = {video.period_s:.4g}, or send it elsewhere with --to"
+        )
+
+
+def _progress(console: Console) -> Any:
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("turns"), TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )  # fmt: skip
+    return Progress(*columns, console=console)
+
+
+def _send(console: Console, recording: Recording, address: tuple[str, int], speed: float, loop: bool) -> None:
+    from app.ingest.replay import Replayer
+
+    replayer = Replayer(recording, address, speed)
+    with _progress(console) as progress:
+        total = None if loop else recording.scans
+        task = progress.add_task(f"to udp://{address[0]}:{address[1]}", total=total)
+        replayer.run(lambda block: progress.advance(task, 1.0 if block.last else 0.0), loop)
+    console.print(f"{replayer.sent} datagrams sent", highlight=False)
+    if replayer.refused:
+        console.print(f"[yellow]{replayer.refused} found nobody listening at that port[/yellow]")
+    _left_out(console, recording)
+
+
+def _left_out(console: Console, recording: Recording) -> None:
+    plain = ("packets", "taken", "sweeps", "scans", "summary", "fragments")
+    left = {name: count for name, count in recording.counters.items() if count and name not in plain}
+    if left:
+        console.print(f"[yellow]left out: {', '.join(f'{name} {count}' for name, count in left.items())}[/yellow]")
+
+
+def _print_plots(console: Console, recording: Recording, settings: Settings) -> None:
+    from app.assembly import radar_chain
+    from pipeline.tables import Plots, SectorPlots
+
+    chain = radar_chain(recording.site, 0, settings, None)
+    turn: list[Plots] = []
+
+    def show(scan: int, time: float) -> None:
+        plots = Plots.concatenate(turn)
+        turn.clear()
+        strong = plots[plots.peak_amplitude.argsort()[::-1][:5]] if len(plots) else plots
+        told = "  ".join(
+            f"({one.east[0]:.0f}, {one.north[0]:.0f}) m" for one in (strong[i] for i in range(len(strong)))
+        )
+        console.print(f"turn {scan:5d}  {time:.2f}  {len(plots):4d} plots  {told}", highlight=False)
+
+    scan, time = 0, float("nan")
+    for block in recording.blocks():
+        if block.scan != scan and turn:
+            show(scan, time)
+        sector: SectorPlots = chain.process(block)
+        scan, time = block.scan, float(block.time[-1])
+        turn.append(sector.plots)
+    turn.append(chain.flush().plots)
+    show(scan, time)
+    _left_out(console, recording)

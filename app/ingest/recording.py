@@ -1,0 +1,118 @@
+"""What the readers of recordings have in common."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.contract import Refused
+from pipeline.sites import RadarSite
+from pipeline.tables import Sweeps, VideoFormat
+
+MAX_AZIMUTHS, MAX_RANGES, MAX_CELLS = 65536, 16384, 1 << 27
+
+
+class RecordingError(Refused):
+    """A recording that cannot be read; the message names the file and the reason."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recording that is open. site: its radar, at the origin. scans: turns in it, None when that is not known.
+
+    blocks: gives the blocks of sweeps from the beginning; raises RecordingError where the file turns out to be damaged.
+    counters: what was read and what was left out, by reason; grows while blocks are read.
+    """
+
+    path: Path
+    site: RadarSite
+    scans: int | None
+    blocks: Callable[[], Iterator[Sweeps]]
+    counters: Counter[str] = field(default_factory=Counter)
+
+
+def blocks_of_turn(
+    scan: int, amplitude: NDArray[np.uint8], begin: float, period: float, blocks: int
+) -> Iterator[Sweeps]:
+    """One turn (azimuths, ranges) uint8 that took `period` seconds from `begin` on, in `blocks` blocks."""
+    azimuths = len(amplitude)
+    parts = min(blocks, azimuths)
+    edges = [-(-i * azimuths // parts) for i in range(parts + 1)]
+    for low, high in pairwise(edges):
+        row = np.arange(low, high, dtype=np.int32)
+        turn = (row + 0.5) / azimuths
+        yield Sweeps(
+            radar=0, scan=scan, row=row, azimuth=2 * math.pi * turn, time=begin + turn * period,
+            amplitude=np.ascontiguousarray(amplitude[low:high]), last=high == azimuths,
+        )  # fmt: skip
+
+
+def turns_of(
+    path: Path, times: NDArray[np.float64], period: float | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """(begin, period) of each turn, and the usual period."""
+    if not len(times) or not bool(np.isfinite(times).all()):
+        raise RecordingError(f"{path}: times must be finite numbers")
+    steps = np.diff(times)
+    if len(steps) and steps.min() <= 0:
+        raise RecordingError(f"{path}: time steps back after turn {int(np.argmin(steps > 0))}")
+    usual = period if period is not None else (float(np.median(steps)) if len(steps) else 1.0)
+    # a turn that was not recorded must not slow down the one before it
+    periods = np.append(np.where(steps > 1.5 * usual, usual, steps), usual)
+    return times, periods, usual
+
+
+def stretch_table(path: Path, bits: int | None, turn: NDArray[np.uint8]) -> tuple[int, NDArray[np.uint8]]:
+    """(bits, table of 256 values): bits as given or as the first turn says."""
+    used = bits if bits is not None else (4 if int(turn.max(initial=0)) <= 15 else 8)
+    if not 1 <= used <= 8:
+        raise RecordingError(f"{path}: bits must be 1 to 8, not {used}")
+    top = (1 << used) - 1
+    return used, (np.minimum(np.arange(256), top) * 255 // top).astype(np.uint8)
+
+
+def video_format(path: Path, shape: tuple[int, int], period: float, words: Mapping[str, Any]) -> VideoFormat:
+    """The format of turns of `shape`, with what the file says in `words`. Raises RecordingError."""
+    azimuths, ranges = shape
+    if not 16 <= azimuths <= MAX_AZIMUTHS or not 16 <= ranges <= MAX_RANGES or azimuths * ranges > MAX_CELLS:
+        raise RecordingError(f"{path}: {azimuths} azimuths of {ranges} cells cannot be used")
+    return VideoFormat(
+        azimuths=azimuths,
+        ranges=ranges,
+        first_range_m=number_of(path, words, "first_range_m", 0.0, 0.0),
+        range_step_m=number_of(path, words, "range_step_m", 3.0, 1e-3),
+        beamwidth_rad=math.radians(number_of(path, words, "beamwidth_deg", max(0.18, 360 / azimuths), 1e-6)),
+        period_s=period,
+        db_per_step=number_of(path, words, "db_per_step", 0.3125, 1e-6),
+    )
+
+
+def number_of(path: Path, words: Mapping[str, Any], name: str, default: float, least: float) -> float:
+    """A finite number from `least` on. Raises RecordingError."""
+    try:
+        value = float(words.get(name, default))
+    except (TypeError, ValueError) as error:
+        raise RecordingError(f"{path}: {name} must be a number") from error
+    if not math.isfinite(value) or value < least or value > 1e6:
+        raise RecordingError(f"{path}: {name} {value:g} is out of range")
+    return value
+
+
+def stretched_turn(
+    path: Path, scan: int, turn: NDArray[np.uint8], bits: int, table: NDArray[np.uint8], begin: float, period: float,
+    blocks: int,
+) -> Iterator[Sweeps]:  # fmt: skip
+    """blocks_of_turn, with values of fewer bits stretched. Raises RecordingError when a value has more."""
+    if bits < 8:
+        if int(turn.max(initial=0)) >> bits:
+            raise RecordingError(f"{path}: turn {scan} has values of more than {bits} bits; say `bits: 8`")
+        turn = table[turn]
+    yield from blocks_of_turn(scan, turn, float(begin), float(period), blocks)
