@@ -18,8 +18,8 @@ class ShapeRule:
 
     start_speed, stop_speed: m/s above and below which a course gives the heading; to start, the speed must also be
     `sure` times its own standard deviation, and the target must have come away from where it was first seen.
-    reverse_speed: m/s, up to which a target
-    may move backwards (push-back). bearing_sd: rad, plots less sure of their long axis do not turn the heading.
+    reverse_speed: m/s, up to which a target may move backwards (push-back). bearing_sd: rad, plots less sure of their
+    long axis do not turn the heading.
     """
 
     grow: float = 0.2
