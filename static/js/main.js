@@ -65,7 +65,10 @@ const feed = new LiveFeed({
   position: () => picture.position(),
   onState: (state) => { link = state; },
   onMessage: (message) => {
+    const before = picture.alertVersion;
     if (picture.apply(message, performance.now()) === 'gap') feed.restart();
+    // an alert does not wait for the panels' rhythm
+    if (picture.alertVersion !== before) refresh();
   },
 });
 

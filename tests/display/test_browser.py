@@ -55,17 +55,17 @@ def test_targets_are_shown_and_move_smoothly(screen: Screen, serving: Serving) -
 def test_every_layer_has_something_on_it(screen: Screen) -> None:
     screen.page.keyboard.press("r")
     screen.until("airside.counts().radarPictures > 0")
-    screen.page.wait_for_timeout(300)
-    inked = screen.page.evaluate(
-        """() => [...document.querySelectorAll('canvas.layer')].map((canvas) => {
-          const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
-          let count = 0;
-          for (let i = 3; i < data.length; i += 4) if (data[i] > 20) count += 1;
-          return count;
-        })"""
+    screen.until(
+        """(() => {
+          const counts = [...document.querySelectorAll('canvas.layer')].map((canvas) => {
+            const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+            let count = 0;
+            for (let i = 3; i < data.length; i += 4) if (data[i] > 20) count += 1;
+            return count;
+          });
+          return counts.length === 4 && counts.every((count) => count > 500);
+        })()"""
     )
-    assert len(inked) == 4
-    assert all(count > 500 for count in inked), inked
     assert screen.errors == []
 
 
@@ -204,7 +204,8 @@ def test_the_wheel_zooms_at_the_cursor_and_a_click_selects(screen: Screen) -> No
     screen.until(f"airside.view().scale > {scale}")
     assert under() == pytest.approx(before, abs=0.5)
     page.keyboard.press("0")
-    page.wait_for_timeout(150)
+    frames = screen.ask("counts().frames")
+    screen.until(f"airside.counts().frames > {frames} + 1")
     standing = next(one for one in screen.ask("positions()") if one["id"] == 6)
     page.mouse.click(host["x"] + standing["x"], host["y"] + standing["y"])
     assert screen.ask("selected()") is not None

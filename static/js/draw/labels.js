@@ -82,7 +82,7 @@ export class LabelLayer {
       label.text = labelText(target.track, level, age);
       [label.w, label.h] = this.size(context, label.text);
       requests.push({
-        id: target.track.id, x: target.x, y: target.y, radius: Math.min(26, radiusOf(target, view.scale)),
+        id: target.track.id, x: target.x, y: target.y, radius: radiusOf(target, view.scale),
         w: label.w, h: label.h, slot: label.slot, must: priority >= 60, pinned: label.pinned,
       });
     }

@@ -21,6 +21,9 @@ const SURFACES = [
   [/Building|VerticalPolygon|Terminal|Hangar|Tower/, 'building', 0],
 ];
 
+/** A name is not repeated nearer than this. */
+const REPEAT_PX = 220;
+
 /** Shapes gathered into one path for each ink, so that a redraw is a dozen fills. */
 export class MapLayer {
   /** @param {AirportMap} airport */
@@ -241,6 +244,8 @@ export class MapLayer {
   /** @param {CanvasRenderingContext2D} context @param {Viewport} view @param {Theme} theme */
   texts(context, view, theme) {
     const taken = new Set();
+    /** @type {Map<string, [number, number][]>} where each name already stands */
+    const written = new Map();
     context.textAlign = 'center';
     context.textBaseline = 'middle';
     context.lineJoin = 'round';
@@ -254,7 +259,10 @@ export class MapLayer {
       for (const point of points.slice(0, limit)) {
         const [x, y] = view.toScreen(point.e, point.n);
         if (x < -20 || y < -20 || x > view.width + 20 || y > view.height + 20) continue;
+        const same = written.get(text) ?? [];
+        if (same.some(([px, py]) => Math.hypot(px - x, py - y) < REPEAT_PX)) continue;
         if (!claim(taken, x, y, Math.max(22, text.length * size * 0.6))) continue;
+        written.set(text, [...same, [x, y]]);
         this.text(context, text, x, y, `${ink === 'text' ? 600 : 400} ${size}px system-ui, sans-serif`, theme.map[ink], theme.map.halo);
       }
     }
