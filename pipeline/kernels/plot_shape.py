@@ -16,6 +16,13 @@ from pipeline.tables import Plots
 COLUMNS = 22
 """Width of a plot's row in the output of the kernels; `plots_from` names the columns."""
 
+SCATTERERS = 16.0
+"""The cells of one target fluctuate together with its few strong scatterers: no more parts than these are
+independent."""
+
+GLINT = 0.3
+"""m^2: how far the centre of the echo strays from that of a small target, on each axis."""
+
 BEARING_FLOOR = 0.06
 """rad: what the long axis of a real target's cells strays from its heading even with very many cells."""
 
@@ -88,11 +95,10 @@ def measure_plot(root: int, runs: Any, turn: Any, constants: Any, sums: Any, out
     """Fill one output row from a component.
 
     root: its first run; the others follow in the NEXT column. turn: (3, azimuths) sine, cosine and time of each row's
-    sweep. Position: unweighted centroid of the cells on the ground. Covariance: the cells' own spread plus that of one
-    resolution cell, divided by the number of independent cells (a plot of one cell is known to its resolution, one of a
-    hundred cells to a tenth of its size), plus the quantisation of the grid. Axis: second moments of the cells
-    (binary), resolution taken out; length and width: extent of the cells along and across that axis, resolution taken
-    out.
+    sweep. Position: unweighted centroid of the cells on the ground. Covariance: the cells' own spread divided by the
+    number of independent parts, one resolution cell divided by the number of resolution cells, the quantisation of the
+    grid and GLINT. Axis: second moments of the cells (binary), resolution taken out; length and width: extent of the
+    cells along and across that axis, resolution taken out.
     """
     east, north, height, step, azimuth_step, beam, azimuths = constants
     sine, cosine, times = turn[0], turn[1], turn[2]
@@ -131,10 +137,11 @@ def measure_plot(root: int, runs: Any, turn: Any, constants: Any, sums: Any, out
     box_u, box_v = step * step / 12, resolution * resolution / 12
     independent = max(1.0, total * cross / resolution)
     grid_v = cross * cross / 12
-    var_u, var_v = box_u / independent + box_u / 12, box_v / independent + grid_v / 12
-    out[4] = cxx / independent + var_u * ux * ux + var_v * uy * uy
-    out[5] = cxy / independent + (var_u - var_v) * ux * uy
-    out[6] = cyy / independent + var_u * uy * uy + var_v * ux * ux
+    var_u, var_v = box_u / independent + box_u / 12 + GLINT, box_v / independent + grid_v / 12 + GLINT
+    parts = min(independent, SCATTERERS)
+    out[4] = cxx / parts + var_u * ux * ux + var_v * uy * uy
+    out[5] = cxy / parts + (var_u - var_v) * ux * uy
+    out[6] = cyy / parts + var_u * uy * uy + var_v * ux * ux
     # the beam widens the cells' cloud across the line of sight
     excess = box_v - grid_v
     dxx, dxy, dyy = cxx - excess * uy * uy, cxy + excess * ux * uy, cyy - excess * ux * ux

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pipeline.detect import Detector
@@ -15,6 +15,9 @@ from pipeline.extract import Extractor
 from pipeline.state import StateError
 from pipeline.tables import Plots, Sweeps, VideoFormat
 from tests.frontend.scenes import SMALL, cut, packed, rayleigh, site, strip
+
+INHERITED = [HealthCheck.differing_executors]
+"""One test run by several subclasses is what a contract is for."""
 
 CUTS = st.lists(st.integers(1, 95), max_size=12)
 
@@ -44,7 +47,7 @@ class DetectorContract:
     def make(self, **setting: Any) -> Detector:
         raise NotImplementedError
 
-    @settings(max_examples=12, deadline=None)
+    @settings(max_examples=12, deadline=None, suppress_health_check=INHERITED)
     @given(cuts=CUTS, missing=st.integers(0, 2**32 - 1), lost=st.sampled_from([0.0, 0.2, 0.9]))
     def test_block_size_does_not_matter(self, cuts: list[int], missing: int, lost: float) -> None:
         keep = np.random.default_rng(missing).random((self.scans, SMALL.azimuths)) >= lost
@@ -173,7 +176,7 @@ class ExtractorContract:
         cells = clumps(rng, 3, SMALL, density)
         return strip(amplitude, SMALL, keep), [cells[scan][keep[scan]] for scan in range(3)]
 
-    @settings(max_examples=20, deadline=None)
+    @settings(max_examples=20, deadline=None, suppress_health_check=INHERITED)
     @given(
         cuts=CUTS,
         seed=st.integers(0, 2**32 - 1),
@@ -203,7 +206,7 @@ class ExtractorContract:
         again.restore(state.save())
         assert_same_plots(straight, Plots.concatenate([first, plots_of(part, blocks[1:], cells[1:], again)]))
 
-    @settings(max_examples=15, deadline=None)
+    @settings(max_examples=15, deadline=None, suppress_health_check=INHERITED)
     @given(seed=st.integers(0, 2**32 - 1), cuts=CUTS)
     def test_nothing_comes_from_before_the_closed_row(self, seed: int, cuts: list[int]) -> None:
         blocks, cells = self.scene(seed, 0.01, 0.0)
