@@ -31,6 +31,9 @@ class TrackerLike(Protocol):
     def tracks(self) -> Tracks:
         """The tracks worth reporting."""
 
+    def warm(self) -> None:
+        """Compile every kernel."""
+
 
 class MonitorLike(Protocol):
     """What the engine needs of an alert monitor; `pipeline.monitor.alert_monitor.AlertMonitor` is the one there is."""

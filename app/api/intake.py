@@ -50,8 +50,6 @@ def intake_router(context: Context) -> APIRouter:
         body = await _body(request, JSON)
         events = _parsed(lambda: parse_node_events(body, service.nodes, limits.node_events_per_request))
         await run_in_threadpool(context.ask, lambda: service.submit_node_events(events), 503)
-        if context.store is not None:
-            context.store.record_node_events(events)
         return answer({"taken": len(events)})
 
     @router.post(

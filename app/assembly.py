@@ -1,0 +1,100 @@
+"""From settings to the parts of the core: sites, chains, tracker and alert monitor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from app.settings import NodeSettings, PartSettings, RadarSettings, Settings, SettingsError
+from pipeline import parts
+from pipeline.airport.model import Airport
+from pipeline.airport.surfaces import surface_of_radar
+from pipeline.chain import RadarChain
+from pipeline.engine import SurfaceEngine
+from pipeline.monitor.alert_monitor import AlertMonitor
+from pipeline.sites import NodeSite, RadarSite
+from pipeline.tables import VideoFormat
+from pipeline.track.tracker import Tracker
+
+
+def radar_site(radar: RadarSettings, airport: Airport) -> RadarSite:
+    """The radar in local metres and radians."""
+    east, north = airport.frame.to_local(radar.latitude, radar.longitude)
+    video = VideoFormat(
+        azimuths=radar.azimuths,
+        ranges=radar.ranges,
+        first_range_m=radar.first_range_m,
+        range_step_m=radar.range_step_m,
+        beamwidth_rad=math.radians(radar.beamwidth_deg),
+        period_s=radar.period_s,
+        db_per_step=radar.db_per_step,
+    )
+    return RadarSite(
+        id=radar.id,
+        east=float(east),
+        north=float(north),
+        height=radar.height_m,
+        video=video,
+        north_offset=math.radians(radar.north_offset_deg),
+        simulated=radar.simulated,
+    )
+
+
+def node_site(node: NodeSettings, airport: Airport) -> NodeSite:
+    """The node in local metres and radians."""
+    east, north = airport.frame.to_local(node.latitude, node.longitude)
+    return NodeSite(
+        id=node.id,
+        east=float(east),
+        north=float(north),
+        heading=math.radians(node.heading_deg),
+        hold=node.hold,
+        runway=node.runway,
+        accuracy=node.accuracy_m,
+        simulated=node.simulated,
+    )
+
+
+def radar_chain(site: RadarSite, index: int, settings: Settings, airport: Airport | None) -> RadarChain:
+    """The chosen detector and extractor on one radar's video."""
+    surface = surface_of_radar(airport, site) if airport is not None else None
+    return RadarChain(
+        site, index, _part("detect", settings.parts.detect), _part("extract", settings.parts.extract), surface=surface
+    )
+
+
+def surface_engine(
+    settings: Settings,
+    airport: Airport,
+    radars: tuple[RadarSite, ...],
+    nodes: tuple[NodeSite, ...],
+    *,
+    first_alert: int = 1,
+    clock: Callable[[], float] | None = None,
+) -> SurfaceEngine:
+    """Tracker and alert monitor as chosen, with the runways in the state that the settings give."""
+    tracker = Tracker(
+        airport,
+        radars,
+        nodes,
+        filter=_part("filter", settings.parts.filter),
+        associate=_part("associate", settings.parts.associate),
+        lifecycle=_part("lifecycle", settings.parts.lifecycle),
+        classify=_part("classify", settings.parts.classify),
+    )
+    rules = tuple(_part("alert", one) for one in settings.parts.alert)
+    monitor = AlertMonitor(airport, rules, first_id=first_alert, nodes=nodes)
+    for runway in settings.runways:
+        try:
+            monitor.set_runway(runway.id, open=runway.open, in_use=runway.in_use or "", visibility=runway.visibility)
+        except (KeyError, ValueError) as error:
+            raise SettingsError(f"runways: {error}") from error
+    return SurfaceEngine(airport, radars, nodes, tracker, monitor, clock)
+
+
+def _part(verb: str, chosen: PartSettings) -> Any:
+    try:
+        return parts.build(verb, chosen.name, chosen.settings())
+    except parts.PartError as error:
+        raise SettingsError(f"parts.{verb}: {error}") from error

@@ -1,0 +1,60 @@
+"""`airside serve` and `airside demo`: run the service."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+SettingsFile = Annotated[
+    Path | None,
+    typer.Option("--settings", "-s", envvar="AIRSIDE_SETTINGS", help="TOML file; see [bold]airside init[/bold]."),
+]
+Port = Annotated[int | None, typer.Option("--port", "-p", help="HTTP port; 8000 unless AIRSIDE_PORT says otherwise.")]
+Host = Annotated[str | None, typer.Option("--host", help="Address to listen on.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    app.command()(serve)
+    app.command()(demo)
+
+
+def serve(settings: SettingsFile = None, port: Port = None, host: Host = None) -> None:
+    """Run the service on your own sensors, as the settings file says.
+
+    Radar video is awaited as ASTERIX CAT240 over UDP on each radar's port; everything else comes and goes over HTTP.
+    """
+    _run(settings, "live", port, host)
+
+
+def demo(settings: SettingsFile = None, port: Port = None, host: Host = None) -> None:
+    """Run the demonstration: Paris-Orly, recorded movements as simulated radar video, an incident every 90 s.
+
+    The simulator sends CAT240 datagrams to the same UDP port that a real radar would use.
+    """
+    _run(settings, "demo", port, host)
+
+
+def _run(path: Path | None, mode: str, port: int | None, host: str | None) -> None:
+    from rich.console import Console
+
+    from app.console import fail
+    from app.settings import SettingsError, load
+
+    overrides = {"port": port, "host": host, "mode": mode}
+    console = Console(stderr=False)
+    try:
+        settings = load(path, **{key: value for key, value in overrides.items() if value is not None})
+        if mode == "demo":
+            from app.demo import demo_settings
+
+            settings = demo_settings(settings)
+        console.print(f"[bold]Airside[/bold] starts: {settings.airport}, mode {settings.mode}", highlight=False)
+        from app.run import serve as run
+
+        status = run(settings, console)
+    except SettingsError as error:
+        raise fail(str(error)) from error
+    raise typer.Exit(status)

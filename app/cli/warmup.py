@@ -1,0 +1,33 @@
+"""`airside warmup`: compile every kernel, so that the next start is quick."""
+
+from __future__ import annotations
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(warmup)
+
+
+def warmup() -> None:
+    """Compile every kernel into the cache (a Docker image does this when it is built)."""
+    import time
+
+    from rich.console import Console
+
+    from app.airports import load_airport
+    from app.demo import demo_settings
+    from app.demo import warm as warm_simulator
+    from app.service import SurfaceService
+    from app.settings import load
+
+    console = Console()
+    begun = time.perf_counter()
+    settings = demo_settings(load())
+    service = SurfaceService(settings, *load_airport(settings.airport))
+    with console.status("compiling the kernels of the chain and the tracker"):
+        service.prepare()
+    with console.status("compiling the kernels of the simulator"):
+        warm_simulator()
+    console.print(f"every kernel is compiled ({time.perf_counter() - begun:.1f} s)")

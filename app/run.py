@@ -1,0 +1,174 @@
+"""From settings to a served service: start-up in steps that a person can follow, and an orderly end."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Any
+
+import uvicorn
+from rich.console import Console
+from rich.logging import RichHandler
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from app.airports import load_airport
+from app.api.application import create_app
+from app.bus import connect_bus
+from app.ingest.mqtt import MqttThread
+from app.live.hub import Hub
+from app.service import SurfaceService
+from app.settings import Settings
+from app.store.store import Store
+
+if TYPE_CHECKING:
+    from app.view3d import View3D
+
+log = logging.getLogger("airside")
+
+
+class Running:
+    """A service with its store, feeds and server. `begin` is run in a thread while the server already answers."""
+
+    def __init__(self, settings: Settings) -> None:
+        settings.data_dir.mkdir(parents=True, exist_ok=True)
+        self.settings = settings
+        airport, document = load_airport(settings.airport)
+        self.service = SurfaceService(settings, airport, document)
+        self.store = Store(settings.database, settings, airport)
+        self.hub = Hub(self.service, settings)
+        self.view3d: View3D | None = None
+        view_router = None
+        if settings.view3d:
+            from app.view3d import View3D, router
+
+            self.view3d = View3D(airport)
+            view_router = router(self.view3d, settings)
+        self.app = create_app(self.service, hub=self.hub, store=self.store, view3d_router=view_router)
+        self._ends = ExitStack()
+
+    def begin(self, step: Callable[[str], None]) -> None:
+        """Migrate, warm up, open the sockets; `step` hears what is being done. Raises what goes wrong."""
+        service, store = self.service, self.store
+        step("database: bringing the schema up to date")
+        store.start()
+        self._ends.callback(store.stop)
+        store.close_open_alerts("restart", time.time())
+        service.checks["database"] = True
+        step("kernels: compiling or loading from the cache")
+        service.prepare(first_alert=store.last_alert_id() + 1)
+        service.extra_counters["store"] = store.writer_counters
+        service.keep_node_events = store.record_node_events
+        service.listen(store.record)
+        service.listen(self.hub.publish)
+        if self.view3d is not None:
+            step("3D view: building the scene")
+            self.view3d.start()
+            self._ends.callback(self.view3d.stop)
+            view = self.view3d
+            service.listen(lambda picture, _changes: view.update(picture))
+        bus = connect_bus(self.settings.bus_url, service)
+        self._ends.callback(bus.close)
+        step("sensors: opening the sockets")
+        service.start()
+        self._ends.callback(service.stop)
+        if self.settings.mqtt.url:
+            mqtt = MqttThread(self.settings.mqtt, service)
+            mqtt.start()
+            self._ends.callback(mqtt.stop)
+        if self.settings.mode == "demo":
+            step("simulator: bringing Orly to life")
+            self._begin_demo()
+
+    def end(self) -> None:
+        """Stop everything in the opposite order; the store drains last."""
+        self._ends.close()
+
+    def _begin_demo(self) -> None:
+        from app.demo import demo_feed
+
+        feed = demo_feed(self.service, self.settings)
+        self.service.extra_counters["demo"] = feed.counters
+        feed.start()
+        self._ends.callback(feed.stop)
+
+
+def serve(settings: Settings, console: Console) -> int:
+    """Run until SIGINT or SIGTERM; the exit status."""
+    _log_to(console, settings.log_level)
+    running = Running(settings)
+    config = uvicorn.Config(
+        running.app,
+        host=settings.host,
+        port=settings.port,
+        log_config=None,
+        ws="websockets-sansio",
+        ws_max_size=64 * 1024 * 1024,
+        ws_ping_interval=20.0,
+        ws_ping_timeout=20.0,
+        ws_per_message_deflate=settings.feed.compress,
+        timeout_graceful_shutdown=3,
+        access_log=False,
+    )
+    server = uvicorn.Server(config)
+    failed: list[BaseException] = []
+
+    def start() -> None:
+        try:
+            _begin_aloud(running, console, server)
+        except BaseException as error:
+            failed.append(error)
+            log.error("start-up failed: %s", error, exc_info=settings.log_level == "debug")
+            server.should_exit = True
+
+    starter = threading.Thread(target=start, name="start-up")
+    starter.start()
+    try:
+        server.run()
+    finally:
+        starter.join()
+        running.end()
+    return 1 if failed or not server.started else 0
+
+
+def _begin_aloud(running: Running, console: Console, server: uvicorn.Server) -> None:
+    begun = time.monotonic()
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=not console.is_terminal) as progress:
+        tasks: list[Any] = []
+
+        def step(text: str) -> None:
+            if tasks:
+                progress.update(tasks[-1], total=1, completed=1)
+            if not console.is_terminal:
+                console.print(f"  {text}")
+            tasks.append(progress.add_task(text, total=None))
+
+        running.begin(step)
+        step("first picture")
+        while not running.service.readiness().ready and not server.should_exit:
+            time.sleep(0.05)
+        progress.update(tasks[-1], total=1, completed=1)
+    if server.should_exit:
+        return
+    settings = running.settings
+    host = "127.0.0.1" if settings.host in ("0.0.0.0", "::") else settings.host
+    port = server.servers[0].sockets[0].getsockname()[1] if server.started and server.servers else settings.port
+    console.print(
+        f"\n[bold]Airside[/bold] {running.service.airport.icao} is ready after {time.monotonic() - begun:.1f} s:"
+        f" [bold cyan]http://{host}:{port}[/bold cyan]   (Ctrl-C ends it)\n",
+        highlight=False,
+    )
+
+
+def _log_to(console: Console, level: str) -> None:
+    logging.basicConfig(
+        level=level.upper(),
+        format="%(message)s",
+        datefmt="%H:%M:%S",
+        handlers=[RichHandler(console=console, show_path=False)],
+    )
+    for noisy in ("uvicorn.error", "uvicorn.access", "websockets", "alembic", "numba"):
+        logging.getLogger(noisy).setLevel(logging.WARNING)

@@ -1,0 +1,212 @@
+"""The running service: what `app.contract.Service` promises, made of the threads of `app.runtime`."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from typing import Any
+
+from app.assembly import node_site, radar_chain, radar_site, surface_engine
+from app.contract import PictureListener, Readiness, Refused, UnknownId, Video
+from app.ingest.octets import decode_sweeps
+from app.ingest.udp import VideoReceiver
+from app.runtime.radar_worker import RadarWorker
+from app.runtime.surface_worker import SurfaceWorker
+from app.settings import Settings
+from pipeline.airport.model import Airport
+from pipeline.picture import Alert, AlertChange, Picture, RunwayState, SensorState, Visibility
+from pipeline.sites import RadarSite
+from pipeline.tables import NodeEvents, TargetReports
+
+log = logging.getLogger(__name__)
+
+SENSOR_SILENT_S = 10.0
+"""Target reports and node events are called silent after this long without any."""
+
+
+class SurfaceService:
+    """One airport, running. Made cold; `prepare` warms it, `start` starts its threads, `stop` ends them."""
+
+    def __init__(self, settings: Settings, airport: Airport, airport_geojson: dict[str, Any]) -> None:
+        self.settings = settings
+        self.airport = airport
+        self.airport_geojson = airport_geojson
+        self.radars = tuple(radar_site(one, airport) for one in settings.radars)
+        self.nodes = tuple(node_site(one, airport) for one in settings.nodes)
+        self.checks = {"database": False, "warm": False, "picture": False}
+        self.extra_counters: dict[str, Callable[[], dict[str, int]]] = {}
+        self.keep_node_events: Callable[[NodeEvents], None] = lambda events: None
+        self._workers: dict[str, RadarWorker] = {}
+        self._receivers: dict[str, VideoReceiver] = {}
+        self._surface: SurfaceWorker | None = None
+        self._heard: dict[str, tuple[float, float, int]] = {}
+
+    def prepare(self, first_alert: int = 1) -> None:
+        """Build the chains and the engine and compile every kernel. Raises SettingsError."""
+        engine = surface_engine(
+            self.settings, self.airport, self.radars, self.nodes, first_alert=first_alert, clock=time.perf_counter
+        )
+        engine.tracker.warm()
+        self._surface = SurfaceWorker(engine, self.sensors, self.settings.limits.rows_queued)
+        for index, (site, radar) in enumerate(zip(self.radars, self.settings.radars, strict=True)):
+            chain = radar_chain(site, index, self.settings, self.airport)
+            chain.warm()
+            worker = RadarWorker(site, chain, self.settings.limits.blocks_queued, self._surface.inbox.offer)
+            self._workers[site.id] = worker
+            if radar.udp is not None:
+                self._receivers[site.id] = VideoReceiver(site, index, radar, worker.put)
+        self.checks["warm"] = True
+
+    def start(self) -> None:
+        """Open the sockets and start the threads. Raises OSError when a port is taken."""
+        surface = self._running
+        surface.listen(self._first_picture)
+        surface.start()
+        for worker in self._workers.values():
+            worker.start()
+        for receiver in self._receivers.values():
+            receiver.start()
+
+    def stop(self) -> None:
+        """Close the sockets, work off what waits, end the threads."""
+        for receiver in self._receivers.values():
+            receiver.stop()
+        for worker in self._workers.values():
+            worker.stop()
+        if self._surface is not None:
+            self._surface.stop()
+
+    def video_port(self, radar: str) -> int:
+        """The UDP port that a radar's datagrams go to. Raises UnknownId."""
+        if radar not in self._receivers:
+            raise UnknownId(radar)
+        return self._receivers[radar].port
+
+    def readiness(self) -> Readiness:
+        """Which start-up checks are passed, and whether the threads still live."""
+        threads = self._surface is not None and self._surface.alive and all(w.alive for w in self._workers.values())
+        return Readiness({**self.checks, "threads": threads})
+
+    def picture(self) -> Picture | None:
+        """The newest picture."""
+        return self._surface.newest if self._surface is not None else None
+
+    def listen(self, listener: PictureListener) -> Callable[[], None]:
+        """Call `listener` with every new picture."""
+        return self._running.listen(listener)
+
+    def sensors(self) -> tuple[SensorState, ...]:
+        """The health of every radar, of the pavement nodes and of the target reports."""
+        radars = tuple(self._radar_state(site) for site in self.radars)
+        others = []
+        if self.nodes:
+            others.append(self._feed_state("nodes", "node", all(node.simulated for node in self.nodes)))
+        if "reports" in self._heard:
+            others.append(self._feed_state("reports", "report", False))
+        return (*radars, *others, self._surface_state())
+
+    def video(self, radar: str) -> Video:
+        """The newest turn of a radar."""
+        if radar not in self._workers:
+            raise UnknownId(radar)
+        worker = self._workers[radar]
+        if worker.last_time is None:
+            raise Refused(f"radar {radar} has not been heard yet")
+        return Video(worker.site, worker.chain.newest, worker.last_time)
+
+    def acknowledge(self, alert: int, by: str) -> Alert:
+        """Acknowledge a live alert."""
+        surface = self._running
+
+        def work(engine: Any) -> AlertChange:
+            change: AlertChange = engine.monitor.acknowledge(alert, by, engine.time)
+            surface.record_change(change)
+            return change
+
+        try:
+            change: AlertChange = surface.ask(work)
+        except KeyError as error:
+            raise UnknownId(alert) from error
+        except ValueError as error:
+            raise Refused(str(error)) from error
+        return change.alert
+
+    def set_runway(
+        self, runway: str, *, open: bool | None, in_use: str | None, visibility: Visibility | None
+    ) -> RunwayState:
+        """Set how a runway is used."""
+        try:
+            state: RunwayState = self._running.ask(
+                lambda engine: engine.monitor.set_runway(runway, open=open, in_use=in_use, visibility=visibility)
+            )
+        except KeyError as error:
+            raise UnknownId(runway) from error
+        except ValueError as error:
+            raise Refused(str(error)) from error
+        return state
+
+    def submit_sweeps(self, radar: str, body: bytes) -> dict[str, int]:
+        """Take sweeps in octet form, as if they had come by datagram."""
+        if radar not in self._receivers and radar not in self._workers:
+            raise UnknownId(radar)
+        index = next(i for i, site in enumerate(self.radars) if site.id == radar)
+        blocks, counted = decode_sweeps(body, self.radars[index], index)
+        for block in blocks:
+            self._workers[radar].put(block)
+        return counted
+
+    def submit_node_events(self, events: NodeEvents) -> None:
+        """Take node events, and have them stored."""
+        self._submit("nodes", events)
+        self.keep_node_events(events)
+
+    def submit_target_reports(self, reports: TargetReports) -> None:
+        """Take target reports."""
+        self._submit("reports", reports)
+
+    @property
+    def _running(self) -> SurfaceWorker:
+        if self._surface is None:
+            raise Refused("the service is still starting")
+        return self._surface
+
+    def _submit(self, kind: str, table: NodeEvents | TargetReports) -> None:
+        if not len(table):
+            return
+        if not self._running.inbox.offer(table):
+            raise Refused(f"the queue for {kind} is full")
+        _, _, total = self._heard.get(kind, (0.0, 0.0, 0))
+        self._heard[kind] = (time.monotonic(), float(table.time.max()), total + len(table))
+
+    def _first_picture(self, picture: Picture, _changes: tuple[AlertChange, ...]) -> None:
+        self.checks["picture"] = True
+
+    def _radar_state(self, site: RadarSite) -> SensorState:
+        worker, receiver = self._workers.get(site.id), self._receivers.get(site.id)
+        counters = dict(receiver.counters()) if receiver is not None else {}
+        if worker is None:
+            return SensorState(site.id, "radar", "waiting", None, site.simulated, counters=counters)
+        counters.update(worker.counters())
+        return SensorState(site.id, "radar", worker.status, worker.last_time, site.simulated, counters=counters)
+
+    def _feed_state(self, id: str, kind: str, simulated: bool) -> SensorState:
+        heard = self._heard.get(id)
+        if heard is None:
+            return SensorState(id, kind, "waiting", None, simulated)
+        silent = time.monotonic() - heard[0] > SENSOR_SILENT_S and kind != "node"
+        return SensorState(id, kind, "silent" if silent else "ok", heard[1], simulated, counters={"taken": heard[2]})
+
+    def _surface_state(self) -> SensorState:
+        surface = self._surface
+        if surface is None:
+            return SensorState("surface", "tracker", "waiting", None)
+        counters = {
+            **surface.engine.tracker.counters,
+            "queue_refused": surface.inbox.refused,
+            "failures": surface.failures,
+        }
+        for more in self.extra_counters.values():
+            counters.update(more())
+        newest = surface.newest
+        return SensorState("surface", "tracker", "ok", newest.time if newest else None, counters=counters)
