@@ -37,7 +37,7 @@ def expected(components: list[Any], azimuths: int) -> list[tuple[int, ...]]:
     return sorted(rows)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
     density=st.sampled_from([0.01, 0.04, 0.1]),
