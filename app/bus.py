@@ -99,15 +99,18 @@ class NatsBus:
     async def _serve(self) -> None:
         import nats
 
-        client: Any = None
-        while client is None:
-            try:
-                client = await nats.connect(self.url, max_reconnect_attempts=-1, error_cb=self._complain)
-            except (OSError, nats.errors.Error) as error:
-                log.warning("bus %s: %s", self.url, error)
-                self._counts["retries"] += 1
-                if await self._pause(RETRY_S):
-                    return
+        # The client tries for ever by itself; only the end of the service ends that.
+        connecting = asyncio.create_task(
+            nats.connect(self.url, max_reconnect_attempts=-1, reconnect_time_wait=RETRY_S, error_cb=self._complain)
+        )
+        closing = asyncio.create_task(self._closing.wait())
+        await asyncio.wait((connecting, closing), return_when=asyncio.FIRST_COMPLETED)
+        if not connecting.done():
+            connecting.cancel()
+            await asyncio.gather(connecting, return_exceptions=True)
+            return
+        closing.cancel()
+        client: Any = connecting.result()
         try:
             stream = client.jetstream(timeout=2.0)
             ready = False
@@ -122,6 +125,7 @@ class NatsBus:
                 await asyncio.wait_for(client.close(), 2.0)
 
     async def _complain(self, error: Exception) -> None:
+        self._counts["retries"] += 1
         log.warning("bus %s: %s", self.url, error or type(error).__name__)
 
     async def _pause(self, seconds: float) -> bool:

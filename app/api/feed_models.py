@@ -11,6 +11,7 @@ from app.api.models import ClassName, Mode, Model, Seconds
 from app.live.messages import DEFAULT_RATE_HZ, RATES_HZ
 
 Topic = Literal["tracks", "alerts", "status"]
+ALL_TOPICS: tuple[Topic, ...] = ("tracks", "alerts", "status")
 Number = Annotated[int | str | None, Field(description="echoed in the answer")]
 
 
@@ -43,7 +44,7 @@ class Subscribe(Model):
 
     type: Literal["subscribe"]
     id: Number = None
-    topics: list[Topic] = Field(default_factory=lambda: ["tracks", "alerts", "status"])
+    topics: list[Topic] = Field(default_factory=lambda: list(ALL_TOPICS))
     filter: FilterWish = FilterWish()
     max_rate_hz: float = Field(DEFAULT_RATE_HZ, gt=0, description=f"rounded down to one of {RATES_HZ}")
 

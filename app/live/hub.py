@@ -253,7 +253,7 @@ class Hub:
                 self._last_tick[rate] = max(last + 1.0 / rate, now - 1.0 / rate)
                 due.add(rate)
             elif rate not in self._later:  # too early: should no later picture come, this one is still sent
-                wait = last + 1.0 / rate - now
+                wait = last + 1.2 / rate - now
                 self._later[rate] = asyncio.get_running_loop().call_later(wait, self._tick_late, rate)
         if not due:
             return
