@@ -56,12 +56,17 @@ def node_site(node: NodeSettings, airport: Airport) -> NodeSite:
     )
 
 
-def radar_chain(site: RadarSite, index: int, settings: Settings, airport: Airport | None) -> RadarChain:
+def radar_chain(
+    site: RadarSite,
+    index: int,
+    settings: Settings,
+    airport: Airport | None,
+    clock: Callable[[], float] | None = None,
+) -> RadarChain:
     """The chosen detector and extractor on one radar's video."""
     surface = surface_of_radar(airport, site) if airport is not None else None
-    return RadarChain(
-        site, index, _part("detect", settings.parts.detect), _part("extract", settings.parts.extract), surface=surface
-    )
+    detector, extractor = _part("detect", settings.parts.detect), _part("extract", settings.parts.extract)
+    return RadarChain(site, index, detector, extractor, surface=surface, clock=clock)
 
 
 def surface_engine(

@@ -77,6 +77,7 @@ class Running:
         if self.settings.mqtt.url:
             mqtt = MqttThread(self.settings.mqtt, service)
             mqtt.start()
+            service.extra_counters["mqtt"] = mqtt.counters
             self._ends.callback(mqtt.stop)
         if self.settings.mode == "demo":
             step("simulator: bringing Orly to life")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import logging
+import threading
 import time
 from collections.abc import Callable
 from typing import Any
 
 from app.assembly import node_site, radar_chain, radar_site, surface_engine
 from app.contract import PictureListener, Readiness, Refused, UnknownId, Video
-from app.ingest.octets import decode_sweeps
+from app.ingest.octets import OctetIntake
 from app.ingest.udp import VideoReceiver
 from app.runtime.radar_worker import RadarWorker
 from app.runtime.surface_worker import SurfaceWorker
@@ -41,6 +42,11 @@ class SurfaceService:
         self._receivers: dict[str, VideoReceiver] = {}
         self._surface: SurfaceWorker | None = None
         self._heard: dict[str, tuple[float, float, int]] = {}
+        self._octets = {
+            site.id: OctetIntake(site, index, radar.blocks_per_scan)
+            for index, (site, radar) in enumerate(zip(self.radars, settings.radars, strict=True))
+        }
+        self._octets_lock = threading.Lock()
 
     def prepare(self, first_alert: int = 1) -> None:
         """Build the chains and the engine and compile every kernel. Raises SettingsError."""
@@ -48,9 +54,9 @@ class SurfaceService:
             self.settings, self.airport, self.radars, self.nodes, first_alert=first_alert, clock=time.perf_counter
         )
         engine.tracker.warm()
-        self._surface = SurfaceWorker(engine, self.sensors, self.settings.limits.rows_queued)
+        self._surface = SurfaceWorker(engine, self.sensors, self.settings.limits.rows_queued, self._stage_timings)
         for index, (site, radar) in enumerate(zip(self.radars, self.settings.radars, strict=True)):
-            chain = radar_chain(site, index, self.settings, self.airport)
+            chain = radar_chain(site, index, self.settings, self.airport, time.perf_counter)
             chain.warm()
             worker = RadarWorker(site, chain, self.settings.limits.blocks_queued, self._surface.inbox.offer)
             self._workers[site.id] = worker
@@ -148,12 +154,15 @@ class SurfaceService:
 
     def submit_sweeps(self, radar: str, body: bytes) -> dict[str, int]:
         """Take sweeps in octet form, as if they had come by datagram."""
-        if radar not in self._receivers and radar not in self._workers:
+        if radar not in self._octets:
             raise UnknownId(radar)
-        index = next(i for i, site in enumerate(self.radars) if site.id == radar)
-        blocks, counted = decode_sweeps(body, self.radars[index], index)
-        for block in blocks:
-            self._workers[radar].put(block)
+        worker = self._workers.get(radar)
+        if worker is None:
+            raise Refused("the service is still starting")
+        with self._octets_lock:
+            blocks, counted = self._octets[radar].take(body)
+            for block in blocks:
+                worker.put(block)
         return counted
 
     def submit_node_events(self, events: NodeEvents) -> None:
@@ -182,6 +191,13 @@ class SurfaceService:
     def _first_picture(self, picture: Picture, _changes: tuple[AlertChange, ...]) -> None:
         self.checks["picture"] = True
 
+    def _stage_timings(self) -> dict[str, float]:
+        return {
+            f"{id}.{stage}": seconds
+            for id, worker in self._workers.items()
+            for stage, seconds in worker.chain.timings.copy().items()
+        }
+
     def _radar_state(self, site: RadarSite) -> SensorState:
         worker, receiver = self._workers.get(site.id), self._receivers.get(site.id)
         counters = dict(receiver.counters()) if receiver is not None else {}
@@ -201,12 +217,16 @@ class SurfaceService:
         surface = self._surface
         if surface is None:
             return SensorState("surface", "tracker", "waiting", None)
+        held_now, held_ever = surface.engine.monitor.held_back
         counters = {
             **surface.engine.tracker.counters,
+            "alerts_held_back": held_ever,
             "queue_refused": surface.inbox.refused,
             "failures": surface.failures,
         }
         for more in self.extra_counters.values():
             counters.update(more())
         newest = surface.newest
-        return SensorState("surface", "tracker", "ok", newest.time if newest else None, counters=counters)
+        detail = f"{held_now} conflicts find no room among the alerts" if held_now else ""
+        status = "degraded" if held_now else "ok"
+        return SensorState("surface", "tracker", status, newest.time if newest else None, False, detail, counters)

@@ -46,6 +46,10 @@ class MonitorLike(Protocol):
     def runways(self) -> tuple[RunwayState, ...]:
         """How each runway is used and what is on it."""
 
+    @property
+    def held_back(self) -> tuple[int, int]:
+        """(now, since start): conflicts that found no room among the live alerts."""
+
     def update(
         self, tracks: Tracks, time: float, *, sensors_degraded: bool = ..., node_events: NodeEvents | None = ...
     ) -> tuple[AlertChange, ...]:

@@ -33,12 +33,19 @@ class Command:
 class SurfaceWorker:
     """Owns the engine: nobody else touches it. Sensors' health comes from `sensors`, called once a picture."""
 
-    def __init__(self, engine: SurfaceEngine, sensors: Callable[[], tuple[SensorState, ...]], limit: int) -> None:
+    def __init__(
+        self,
+        engine: SurfaceEngine,
+        sensors: Callable[[], tuple[SensorState, ...]],
+        limit: int,
+        timings: Callable[[], dict[str, float]] = dict,
+    ) -> None:
         self.engine = engine
         self.inbox: Inbox[SectorPlots | NodeEvents | TargetReports | Command] = Inbox(limit)
         self.newest: Picture | None = None
         self.failures = 0
         self._sensors = sensors
+        self._timings = timings
         self._listeners: list[PictureListener] = []
         self._listening = threading.Lock()
         self._thread = threading.Thread(target=self._run, name="surface", daemon=True)
@@ -136,7 +143,7 @@ class SurfaceWorker:
             self.failures += 1
             log.exception("no picture could be made")
             return
-        picture = replace(picture, sensors=sensors)
+        picture = replace(picture, sensors=sensors, timings={**self._timings(), **picture.timings})
         self.newest = picture
         changes = (*self._pending, *changes)
         self._pending.clear()

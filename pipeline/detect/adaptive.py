@@ -53,7 +53,8 @@ START_SCANS = 30
 
 @dataclass(eq=False, kw_only=True)
 class AdaptiveState(ArrayState):
-    """offset: of each cell, in 1/128 step. level, spread, bias: of each patch, in steps. The rest: see the kernel."""
+    """offset: of each cell, in 1/128 step. level, spread, bias: of each patch, in steps. heard: scans in which each
+    patch was swept. The rest: see the kernel."""
 
     azimuths: int
     rule: tuple[float, ...]
@@ -72,7 +73,8 @@ class AdaptiveState(ArrayState):
     bias: NDArray[np.float64] = remembered()
     base: NDArray[np.int32] = remembered()
     sums: NDArray[np.float64] = remembered()
-    scans: NDArray[np.int64] = remembered()
+    heard: NDArray[np.int64] = remembered()
+    scan: NDArray[np.int64] = remembered()
     budget: NDArray[np.float64] = remembered()
     degraded_sweeps: NDArray[np.int64] = remembered()
 
@@ -161,7 +163,8 @@ class Adaptive:
             bias=np.zeros(patches),
             base=np.full(patches, 10_000, np.int32),
             sums=np.zeros((patches, 4)),
-            scans=np.array([-1, 0], np.int64),
+            heard=np.zeros(patches, np.int64),
+            scan=np.array([-1], np.int64),
             budget=np.array([CapSettings.of(self.max_runs, video.azimuths).depth]),
             degraded_sweeps=np.zeros(1, np.int64),
         )
@@ -178,7 +181,7 @@ class Adaptive:
             mask,
             state.rule,
             (state.run_at, state.run_first, state.run_patch, state.macro, state.bounds, state.wide, state.soft),
-            (state.offset, state.level, state.spread, state.bias, state.base, state.sums, state.scans),
+            (state.offset, state.level, state.spread, state.bias, state.base, state.sums, state.heard, state.scan),
             (cap.refill, cap.depth, state.budget, state.degraded_sweeps),
             state.row_limits,
             state.tail,
@@ -266,24 +269,24 @@ def _detect(
     tail: Any,
 ) -> None:
     run_at, run_first, run_patch = layout[0], layout[1], layout[2]
-    offset, base, scans = memory[0], memory[4], memory[6]
+    offset, base, heard, current = memory[0], memory[4], memory[6], memory[7]
     refill, depth, budget, degraded = cap
     n, ranges = amplitude.shape
     words = mask.shape[1]
     whole = ranges // 64
     limits_at, tail_at = limits.ctypes.data, tail.ctypes.data
     for i in range(n):
-        if scan != scans[0]:
-            if scans[0] >= 0:
+        if scan != current[0]:
+            if current[0] >= 0:
                 _finish_scan(rule, layout, memory)
-                scans[1] += 1
-            scans[0] = scan
+            current[0] = scan
         row = rows[i]
         cells = amplitude[i]
         own = offset[row]
         for k in range(run_at[row], run_at[row + 1]):
             end = run_first[k + 1] if k + 1 < run_at[row + 1] else ranges
-            _limit(own[run_first[k] : end], base[run_patch[k]], limits[run_first[k] : end])
+            p = run_patch[k]
+            _limit(own[run_first[k] : end], base[p] if heard[p] >= rule[8] else 10_000, limits[run_first[k] : end])
         bits = mask[i]
         row_at = cells.ctypes.data
         anything = np.uint64(0)
@@ -297,17 +300,14 @@ def _detect(
             bits[whole] = bits_above(tail_at, limits_at + np.uintp(64 * whole))
             anything |= bits[whole]
         budget[0] = min(budget[0] + refill, depth)
-        if scans[1] < rule[8]:
-            bits[:] = 0
-        elif anything:
+        if anything:
             runs = count_runs(bits)
             if runs <= budget[0]:
                 budget[0] -= runs
             else:
                 degraded[0] += 1
                 fit_row(cells, limits_at, bits, budget, tail)
-        if scans[1] < rule[5] or (scan + row) % LEARN_EVERY == 0:
-            _learn(cells, row, rule, layout, memory)
+        _learn(cells, row, (scan + row) % LEARN_EVERY == 0, rule, layout, memory)
 
 
 @njit(nogil=True, cache=True)
@@ -318,34 +318,33 @@ def _limit(own: Any, base: int, limits: Any) -> None:
 
 
 @njit(nogil=True, cache=True)
-def _learn(cells: Any, row: int, rule: Any, layout: Any, memory: Any) -> None:
-    """Take one row into the sums of its patches, and let its offsets follow."""
+def _learn(cells: Any, row: int, due: bool, rule: Any, layout: Any, memory: Any) -> None:
+    """Take one row into the sums of its patches, and let its offsets follow. due: also where the start is over."""
     _, rayleigh, margin, _, _, long, below, above, _ = rule
     run_at, run_first, run_patch, _, bounds, _, soft = layout
-    offset, level, spread, bias, base, sums, scans = memory
+    offset, level, spread, bias, base, sums, heard, _ = memory
     own = offset[row]
-    age = np.float64(scans[1])
-    firm_gain = np.int32(8192 * max(1.0 / long, 1.0 / (age + 12.0))) if age > 0 else np.int32(0)
-    soft_gain = np.int32(8192 * max(1.0 / long, 1.0 / (age + 2.0))) if age > 0 else np.int32(0)
-    starting = age < START_SCANS
     errors_within = (np.int32(-below * ONE), np.int32(above * ONE))
     for k in range(run_at[row], run_at[row + 1]):
-        end = run_first[k + 1] if k + 1 < run_at[row + 1] else cells.size
         p = run_patch[k]
-        total = sums[p]
-        open_wide = starting and soft[p]
+        age = np.float64(heard[p])
+        if not due and age >= long:
+            continue
+        end = run_first[k + 1] if k + 1 < run_at[row + 1] else cells.size
+        gain = max(1.0 / long, 1.0 / (age + (2.0 if soft[p] else 12.0))) if age > 0 else 0.0
+        everything = soft[p] and age < START_SCANS
         _learn_run(
             cells[run_first[k] : end],
             own[run_first[k] : end],
             (np.int32(level[p] * ONE), np.int32(bias[p] * ONE)),
             (
                 np.int32((base[p] - margin * _scale(spread[p], rayleigh)) * ONE),
-                np.int32(2**30) if open_wide else np.int32(0),
+                np.int32(2**30) if everything else np.int32(0),
             ),
             errors_within,
-            soft_gain if soft[p] else firm_gain,
+            np.int32(8192 * gain),
             (bounds[p, 0], bounds[p, 1]),
-            total,
+            sums[p],
         )
 
 
@@ -380,36 +379,39 @@ def _learn_run(
 
 @njit(nogil=True, cache=True)
 def _finish_scan(rule: Any, layout: Any, memory: Any) -> None:
-    """Bring the patches up to date with the scan that is over."""
+    """Bring the patches that were swept up to date with the scan that is over."""
     mu, rayleigh, level_gain, spread_gain = rule[0], rule[1], rule[3], rule[4]
     macro, wide, soft = layout[3], layout[5], layout[6]
-    _, level, spread, bias, base, sums, scans = memory
-    young = scans[1] == 0
-    spread_gain = max(spread_gain, 1.0 / (scans[1] + 1.0))
+    _, level, spread, bias, base, sums, heard, _ = memory
     changes = np.zeros((macro.max() + 1, 2))
+    fresh = np.zeros(level.size, np.bool_)
     for p in range(level.size):
         count = sums[p, 0]
         if count > 0:
             moved = sums[p, 1] / count / ONE
             variance = max(sums[p, 2] / count / ONE**2 - moved**2, 0.0)
-            if young:
+            faster = max(spread_gain, 1.0 / (heard[p] + 1.0))
+            if heard[p] == 0:
                 level[p] += moved
+                fresh[p] = wide[p]
                 if soft[p]:
                     spread[p] = np.sqrt(variance)
             else:
-                spread[p] += spread_gain * (np.sqrt(variance) - spread[p])
-                bias[p] += spread_gain * (sums[p, 3] / count / ONE - moved - bias[p])
+                spread[p] += faster * (np.sqrt(variance) - spread[p])
+                bias[p] += faster * (sums[p, 3] / count / ONE - moved - bias[p])
                 if not wide[p]:
                     level[p] += level_gain * moved
                     changes[macro[p], 0] += level_gain * moved * count
                     changes[macro[p], 1] += count
+            heard[p] += 1
         sums[p] = 0.0
     for p in range(level.size):
-        if wide[p] and changes[macro[p], 1] > 0:
+        if wide[p] and not fresh[p] and changes[macro[p], 1] > 0:
             level[p] += changes[macro[p], 0] / changes[macro[p], 1]
-        base[p] = np.int32(np.floor(level[p] + mu * _scale(spread[p], rayleigh) + 0.5))
-    if young:
-        _start_wide(layout, memory)
+        if heard[p] > 0:
+            base[p] = np.int32(np.floor(level[p] + mu * _scale(spread[p], rayleigh) + 0.5))
+    if fresh.any():
+        _start_wide(layout, memory, fresh)
 
 
 @njit(nogil=True, cache=True)
@@ -419,18 +421,19 @@ def _scale(spread: float, rayleigh: float) -> float:
 
 
 @njit(nogil=True, cache=True)
-def _start_wide(layout: Any, memory: Any) -> None:
+def _start_wide(layout: Any, memory: Any, fresh: Any) -> None:
     """Cells beside a border begin at the greatest level of their macro-cell, and come down to their own."""
-    run_at, run_first, run_patch, macro, bounds, wide, _ = layout
-    offset, level = memory[0], memory[1]
+    run_at, run_first, run_patch, macro, bounds, _, _ = layout
+    offset, level, heard = memory[0], memory[1], memory[6]
     highest = np.zeros(macro.max() + 1)
     for p in range(level.size):
-        highest[macro[p]] = max(highest[macro[p]], level[p])
+        if heard[p] > 0:
+            highest[macro[p]] = max(highest[macro[p]], level[p])
     for row in range(offset.shape[0]):
         own = offset[row]
         for k in range(run_at[row], run_at[row + 1]):
             p = run_patch[k]
-            if not wide[p]:
+            if not fresh[p]:
                 continue
             end = run_first[k + 1] if k + 1 < run_at[row + 1] else own.size
             up = min(np.int64((highest[macro[p]] - level[p]) * ONE), np.int64(bounds[p, 1]))

@@ -92,3 +92,17 @@ def test_rain_that_sets_in_makes_no_flood() -> None:
         if number >= 80:
             worst = max(worst, int(mask.sum()))
     assert worst <= 10
+
+
+def test_a_start_in_mid_turn_makes_no_flood() -> None:
+    chance = np.random.default_rng(5)
+    part = Adaptive()
+    state = part.start(VIDEO)
+    found = 0
+    for number in range(60):
+        turn = scan(number, 30 + clutter(chance))
+        if number in (0, 20):
+            keep = slice(200, None) if number == 0 else slice(0, 50)
+            turn = Sweeps(0, number, turn.row[keep], turn.azimuth[keep], turn.time[keep], turn.amplitude[keep])
+        found += int(part(turn, state).cells(VIDEO.ranges).sum())
+    assert found <= 20
