@@ -181,10 +181,10 @@ def _runway_features(runway: RunwayDraft) -> Iterator[Feature]:
     )
     for end, along in ((0, first), (1, runway.length - second)):
         heading = round(math.degrees(runway.heading + math.pi * end) % 360, 2) % 360
-        properties: dict[str, Any] = common | {"designator": runway.designators[end], "heading_deg": heading}
-        properties |= {"displaced_m": round(runway.displaced[end], 1)}
+        threshold: dict[str, Any] = {"designator": runway.designators[end], "heading_deg": heading}
+        threshold |= {"displaced_m": round(runway.displaced[end], 1)}
         id = f"{base}/threshold/{runway.designators[end]}"
-        yield Feature(id, "RunwayThreshold", runway.designators[end], runway.at(along), properties)
+        yield Feature(id, "RunwayThreshold", runway.designators[end], runway.at(along), common | threshold)
 
 
 def _closed_runways(elements: list[Element], frame: LocalFrame) -> Iterator[Feature]:

@@ -29,6 +29,7 @@ from pipeline.airport.runway_access import Access, Lanes, walk_outward
 REACH = 700.0
 """Metres of taxiway within which a position that is said to guard a runway must reach it."""
 UNTYPED_REACH = 260.0
+FURTHER_OUT = 300.0
 LOW_VISIBILITY = ("ils", "cat", "critical")
 
 
@@ -186,6 +187,8 @@ def _derive(
         length = float(np.hypot(*inward))
         if length == 0 or any(_guards(one, east, north, inward / length) for one in mine):
             continue
+        if _held_further_out(lanes, point, trail[-1], blocked):
+            continue
         owner = int(lanes.owner[point])
         name = features[owner].name if owner >= 0 else ""
         source = str(features[owner].properties.get("source", "")) if owner >= 0 else ""
@@ -201,6 +204,25 @@ def _guards(hold: _Hold, east: float, north: float, inward: np.ndarray) -> bool:
     outward = np.array([hold.point.x - east, hold.point.y - north])
     length = float(np.hypot(*outward))
     return length < 12.0 or (length < 70.0 and float(-outward @ inward) > 0.8 * length)
+
+
+def _held_further_out(lanes: Lanes, point: int, inner: int, holds: set[int]) -> bool:
+    """Does every way further out meet a mapped position (as on rapid exits, and where two taxiways join)?"""
+    away = lanes.points[point] - lanes.points[inner]
+    seen = {inner, point}
+    ends = [(point, 0.0)]
+    while ends:
+        here, walked = ends.pop()
+        if here in holds:
+            continue
+        ahead = [(one, step) for one, step in lanes.neighbours[here] if one not in seen]
+        if here == point:  # the points passed on the way here lie behind
+            ahead = [one for one in ahead if float((lanes.points[one[0]] - lanes.points[point]) @ away) > 0]
+        if not ahead or walked > FURTHER_OUT:
+            return False
+        seen.update(one for one, _ in ahead)
+        ends.extend((one, walked + step) for one, step in ahead)
+    return True
 
 
 def _feature(hold: _Hold, runways: Sequence[RunwayDraft]) -> Feature:

@@ -202,7 +202,7 @@ def _stand_ends(stands: list[Feature], taxiways: list[Feature]) -> Iterator[Feat
                 first, last = last, first
                 line = LineString(line.coords[::-1])
         heading = math.degrees(_final_heading(line)) % 360
-        properties = {"source": stand.properties["source"], "heading_deg": round(heading, 1), "derived": True}
+        properties = {"source": stand.properties["source"], "heading_deg": round(heading, 1) % 360, "derived": True}
         yield Feature(f"{stand.id}/stop", "ParkingStandLocation", stand.name, last, properties)
 
 

@@ -111,7 +111,7 @@ def walk_outward(
     if not len(east):
         return access
     away: NDArray[np.float64] = np.asarray(shapely.distance(shapely.points(lanes.points), centreline))
-    at_runway = shapely.contains_xy(strip, east, north)
+    at_runway = shapely.contains_xy(strip.buffer(1.0), east, north)  # a taxiway may meet the very end
     at_other = np.zeros(len(east), np.bool_)
     for other in others:
         at_other |= shapely.contains_xy(other, east, north)

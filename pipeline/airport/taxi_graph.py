@@ -22,6 +22,8 @@ from pipeline.airport.model import Feature, TaxiGraph
 LINES = ("TaxiwayGuidanceLine", "StandGuidanceLine", "PaintedCenterline")
 TOLERANCE = 1.5
 """Metres within which two ends are held to be one place."""
+STAND_GAP = 80.0
+"""Metres by which a stand line may end short of the taxiway it leads to."""
 
 
 @dataclass(frozen=True)
@@ -38,27 +40,37 @@ def build_taxi_graph(features: Sequence[Feature], tolerance: float = TOLERANCE) 
     """Cut all taxiway lines, stand lines and runway centrelines of `features` at their crossings and join the ends.
 
     The feature of an edge is its index in `features`. Lines that end beside a runway centreline (at the runway's edge,
-    or a step short of a bent one) are led on to it.
+    or a step short of a bent one) are led on to it, and so are stand lines that end short of the taxiway.
     """
     owners = [place for place, one in enumerate(features) if one.kind in LINES and isinstance(one.geometry, LineString)]
-    lines = _led_on([features[one] for one in owners])
+    lines = _led_on([features[one] for one in owners], tolerance)
     pieces: list[tuple[LineString, int]] = []
     for owner, line, cuts in zip(owners, lines, _cuts(lines, tolerance), strict=True):
         pieces.extend((piece, owner) for piece in _cut(line, cuts))
     return _joined(pieces, tolerance)
 
 
-def _led_on(features: list[Feature]) -> list[LineString]:
+def _led_on(features: list[Feature], tolerance: float) -> list[LineString]:
     runways = [(one.geometry, float(one.properties.get("width_m", 45.0))) for one in features if one.kind == LINES[2]]
+    taxiways = [one.geometry for one in features if one.kind == LINES[0]]
+    tree = shapely.STRtree(taxiways) if taxiways else None
+    stands = shapely.STRtree([one.geometry for one in features if one.kind == LINES[1]])
     made: list[LineString] = []
     for feature in features:
         points = list(feature.geometry.coords)
-        if feature.kind == "TaxiwayGuidanceLine":
+        if feature.kind == LINES[0]:
             for centreline, width in runways:
                 for end, insert in ((points[0], 0), (points[-1], len(points))):
                     reach = centreline.distance(Point(end))
                     if 0.05 < reach <= width / 2 + 8.0 and not _crosses_near(feature.geometry, centreline, Point(end)):
                         points.insert(insert, centreline.interpolate(centreline.project(Point(end))).coords[0])
+        elif feature.kind == LINES[1] and tree is not None:
+            taxiway = taxiways[int(tree.nearest(feature.geometry))]
+            alone = len(stands.query(feature.geometry, predicate="dwithin", distance=tolerance)) == 1
+            if alone and tolerance < feature.geometry.distance(taxiway) <= STAND_GAP:
+                first, last = Point(points[0]), Point(points[-1])
+                near, insert = (first, 0) if taxiway.distance(first) <= taxiway.distance(last) else (last, len(points))
+                points.insert(insert, taxiway.interpolate(taxiway.project(near)).coords[0])
         made.append(LineString(points))
     return made
 

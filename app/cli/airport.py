@@ -1,0 +1,110 @@
+"""`airside airport`: import, show and list airport maps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+
+airport = typer.Typer(no_args_is_help=True, help="Import, show and list airport maps.")
+
+
+@airport.command("import")
+def import_(
+    file: Annotated[Path, typer.Argument(help="Overpass extract (JSON, asked for with `out geom`).")],
+    icao: Annotated[str, typer.Option(help="ICAO code of the airport in it, such as LFPO.")],
+    output: Annotated[Path | None, typer.Option(help="Where to write the map; ICAO.geojson here by default.")] = None,
+    name: Annotated[str | None, typer.Option(help="Name, when the extract does not tell it.")] = None,
+) -> None:
+    """Make an airport map (GeoJSON) of an OpenStreetMap extract.
+
+    Get an extract from any Overpass server with, for example,
+    [bold]\\[out:json];nwr\\["aeroway"](48.70,2.28,48.77,2.42);out geom;[/bold]
+    (and the buildings and roads of the same box). What the map does not tell (widths, heights, missing holding
+    positions) is derived at the values of ICAO Annex 14, marked in the file, and counted in the summary.
+    """
+    import json
+
+    from pipeline.airport.geojson import AirportFault, airport_from_geojson
+    from pipeline.airport.osm import ImportFault, airport_geojson
+
+    try:
+        extract = json.loads(file.read_text(encoding="utf-8"))
+        document = airport_geojson(extract, icao, name)
+        airport_from_geojson(document)
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        _fail(f"{file}: cannot be read as JSON ({error})")
+    except (ImportFault, AirportFault) as error:
+        _fail(f"{file}: {error}")
+    target = output or Path(f"{document['icao']}.geojson")
+    try:
+        target.write_text(json.dumps(document, ensure_ascii=False, separators=(",", ":")), encoding="utf-8")
+    except OSError as error:
+        _fail(f"{target}: cannot be written ({error})")
+    _summarise(document)
+    typer.echo(f'\nWritten to {target}. Use it with: airport = "{target}" in the settings, or AIRSIDE_AIRPORT={target}')
+
+
+@airport.command("show")
+def show(
+    which: Annotated[str, typer.Argument(metavar="ICAO|FILE", help="Shipped airport, or the path of a map.")],
+) -> None:
+    """Print what a map holds: runways, holding positions, counts."""
+    from app.airports import load_airport
+    from pipeline.airport.geojson import AirportFault
+
+    try:
+        loaded, document = load_airport(which)
+    except AirportFault as error:
+        _fail(str(error))
+    _summarise(document)
+    typer.echo(f"\nTaxiway network: {len(loaded.graph.nodes)} nodes, {len(loaded.graph.edges)} edges")
+    for runway in loaded.runways:
+        typer.echo(f"\nRunway {runway.id}  {runway.centreline.length:.0f} x {runway.width:.0f} m")
+        for hold in sorted((one for one in loaded.holding_positions if one.runway == runway.id), key=lambda h: h.name):
+            derived = "  derived" if hold.derived else ""
+            metres = runway.centreline.distance(hold.position)
+            typer.echo(f"  hold {hold.name or '(unnamed)':10} {hold.category:11} {metres:4.0f} m{derived}  {hold.id}")
+
+
+@airport.command("list")
+def list_() -> None:
+    """Print the airports that come with the program."""
+    import json
+
+    from app.airports import shipped_airports
+
+    for code, path in shipped_airports().items():
+        typer.echo(f"{code}  {json.loads(path.read_text(encoding='utf-8'))['name']}")
+
+
+def register(app: typer.Typer) -> None:
+    """Add `airport` to the command line."""
+    app.add_typer(airport, name="airport")
+
+
+def _summarise(document: dict[str, Any]) -> None:
+    from collections import Counter
+
+    counts = Counter(one["properties"]["kind"] for one in document["features"])
+    typer.echo(f"{document.get('icao', '')}  {document.get('name', '')}")
+    _table("Features", dict(sorted(counts.items())))
+    told = document.get("import")
+    if isinstance(told, dict):
+        _table("Derived, not in the source", told.get("derived"))
+        _table("Left out", told.get("left_out"))
+    typer.echo(f"\n{document.get('attribution', '')}")
+
+
+def _table(title: str, rows: Any) -> None:
+    if not isinstance(rows, dict) or not rows:
+        return
+    typer.echo(f"\n{title}")
+    for name, count in rows.items():
+        typer.echo(f"  {count:6}  {name}")
+
+
+def _fail(message: str) -> NoReturn:
+    typer.echo(f"airside: {message}", err=True)
+    raise typer.Exit(1)
