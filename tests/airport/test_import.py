@@ -263,8 +263,8 @@ position = st.one_of(
 )
 words = st.sampled_from(
     ["runway", "taxiway", "taxilane", "apron", "parking_position", "holding_position", "stopway", "aerodrome",
-     "terminal", "hangar", "tower", "threshold", "helipad", "displaced_threshold", "yes", "no", "construction", "disused", "ILS",
-     "09/27", "09L", "36/18", "45", "45 m", "1e9", "-1", "0", "", "service", "H1", "multipolygon"]
+     "terminal", "hangar", "tower", "threshold", "helipad", "displaced_threshold", "yes", "no", "disused",
+     "construction", "ILS", "09/27", "09L", "36/18", "45", "45 m", "1e9", "-1", "0", "", "H1", "multipolygon"]
 )  # fmt: skip
 keys = st.sampled_from(
     ["aeroway", "ref", "width", "runway", "building", "height", "building:levels", "area", "disused", "disused:aeroway",
