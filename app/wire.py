@@ -42,6 +42,11 @@ def encode(value: Any) -> bytes:
     return encoder.encode(value)
 
 
+def plain(value: Any) -> Any:
+    """The value as it comes back from JSON."""
+    return msgspec.json.decode(encode(value))
+
+
 def accuracy_95(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
     """Semi-major axis (m) of the 95 % ellipse of each position. covariance: (n, >=2, >=2)."""
     a, b, c = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from http import HTTPStatus
 from typing import TYPE_CHECKING, Annotated, Any
 
 from fastapi import Query
@@ -61,8 +62,11 @@ def answer(value: Any, status: int = 200) -> Response:
 
 def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """The declarations of these errors for OpenAPI."""
-    words = {"model": Problem, "content": {PROBLEM: {}}}
-    return dict.fromkeys(statuses, words)
+    schema = Problem.model_json_schema()
+    return {
+        status: {"description": HTTPStatus(status).phrase, "content": {PROBLEM: {"schema": schema}}}
+        for status in statuses
+    }
 
 
 def instant(value: Any) -> float:

@@ -40,6 +40,7 @@ class Queue:
         self.limit = limit
         self.counters: Counter[str] = Counter(points_dropped=0, node_events_dropped=0, sensor_states_dropped=0)
         self._changes: deque[AlertChange] = deque()
+        self._taken: list[AlertChange] = []
         self._tracks: deque[Tracks] = deque()
         self._events: deque[NodeEvents] = deque()
         self._sensors: deque[tuple[float, SensorState]] = deque()
@@ -89,13 +90,24 @@ class Queue:
         with self._condition:
             if not (self._changes or self._calls or self._closed):
                 self._condition.wait(wait_s)
+            self._taken = _drain(self._changes, self.BATCH * 4)
             return Batch(
-                _drain(self._changes, self.BATCH * 4),
+                self._taken,
                 _drain(self._tracks, self.BATCH),
                 _drain(self._events, self.BATCH),
                 _drain(self._sensors, self.BATCH),
                 _drain(self._calls, self.BATCH),
             )
+
+    def changes(self) -> list[AlertChange]:
+        """The alert changes that wait, after those that were taken last (and may be written by now), in order."""
+        with self._condition:
+            return [*self._taken, *self._changes]
+
+    def written(self) -> None:
+        """What was taken last is committed (or given up)."""
+        with self._condition:
+            self._taken = []
 
     def pause(self, seconds: float) -> bool:
         """Wait, but not beyond the end; True when it has come."""

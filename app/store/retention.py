@@ -22,12 +22,17 @@ class Retention:
         self.deleted = 0
         self._next = time.monotonic()
 
-    def run(self, engine: Engine, *, force: bool = False) -> None:
-        """One step, if it is time: at most some hundred tracks with their points, and the rest by time."""
+    @property
+    def limit(self) -> float:
+        """What is older than this goes."""
+        return self.newest - self.keep_s
+
+    def run(self, engine: Engine, *, force: bool = False) -> bool:
+        """Delete, if it is time; whether it was. Some hundred tracks a transaction, and the rest by time."""
         if not self.newest or (time.monotonic() < self._next and not force):
-            return
+            return False
         self._next = time.monotonic() + EVERY_S
-        limit = self.newest - self.keep_s
+        limit = self.limit
         tracks, points = schema.tracks, schema.track_points
         while True:
             with engine.begin() as connection:
@@ -51,3 +56,4 @@ class Retention:
             connection.execute(delete(alerts).where(ended))
             for table in (schema.node_events, schema.sensor_states):
                 connection.execute(delete(table).where(table.c.airport == self.airport, table.c.time < limit))
+        return True

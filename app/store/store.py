@@ -14,7 +14,7 @@ from app.store.database import migrate, open_engine
 from app.store.reader import Reader
 from app.store.retention import Retention
 from app.store.writer import Writer, close_open_alerts
-from app.wire import Row, Wire
+from app.wire import Row, Wire, plain
 from pipeline.airport.model import Airport
 from pipeline.picture import AlertChange, Picture, SensorState
 from pipeline.tables import NodeEvents, Tracks
@@ -60,7 +60,6 @@ class Store:
         """Take a picture (a `PictureListener`): returns at once, never raises."""
         try:
             self._queue.put(changes=changes)
-            self._retention.newest = max(self._retention.newest, picture.time)
             due = picture.tracks[self._due.choose(picture.tracks, picture.time)]
             self._queue.put(tracks=due, sensors=self._changed_sensors(picture))
         except Exception:
@@ -100,12 +99,25 @@ class Store:
         return self._reader.tracks(first, last, callsign=callsign, limit=limit)
 
     def alerts(self, state: str | None, first: float | None, last: float | None, limit: int = 200) -> list[Row]:
-        """Stored alerts that were raised within the times, newest first."""
-        return self._reader.alerts(state, first, last, limit)
+        """Alerts raised within the times, newest first; those that wait to be written are among them."""
+        waiting = {one.alert.id: plain(self.wire.alert(one.alert)) for one in self._queue.changes()}
+        rows = {row["id"]: row for row in self._reader.alerts(state, first, last, limit)}
+        for id, row in waiting.items():
+            rows.pop(id, None)
+            wanted = state in (None, row["state"]) or (state == "live" and row["state"] != "cleared")
+            if wanted and (first is None or row["raised_at"] >= first) and (last is None or row["raised_at"] <= last):
+                rows[id] = row
+        return sorted(rows.values(), key=lambda row: (row["raised_at"], row["id"]), reverse=True)[:limit]
 
     def alert_changes(self, id: int) -> list[Row]:
-        """Every stored step of one alert."""
-        return self._reader.alert_changes(id)
+        """Every step of one alert; those that wait to be written are among them."""
+        waiting = [one for one in self._queue.changes() if one.alert.id == id]
+        rows = self._reader.alert_changes(id)
+        for one in waiting:
+            row = {"time": one.time, "operation": one.operation, "alert": plain(self.wire.alert(one.alert))}
+            if row not in rows:
+                rows.append(row)
+        return rows
 
     def last_alert_id(self) -> int:
         """The greatest alert number of this airport; 0 when there is none."""

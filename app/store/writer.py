@@ -70,6 +70,7 @@ class Writer:
             batch = self.queue.take(COMMIT_S)
             if batch:
                 self._write(batch)
+                self.queue.written()
             elif self.queue.closed:
                 return
             if not self.queue.closed:
@@ -128,6 +129,8 @@ class Writer:
                 done.append((future, work(connection)))
         self._uids.update(fresh)
         self.counters.update(counted)
+        times = [float(one.time.max()) for one in batch.tracks] + [at for at, _ in batch.sensors]
+        self._retention.newest = max([self._retention.newest, *times])
         for future, result in done:
             future.set_result(result)
 
@@ -212,7 +215,9 @@ class Writer:
 
     def _clean(self) -> None:
         try:
-            self._retention.run(self.engine)
+            if self._retention.run(self.engine):
+                limit = self._retention.limit
+                self._uids = {key: one for key, one in self._uids.items() if one[1] >= limit}
         except DBAPIError as error:
             log.warning("old rows could not be deleted: %s", error.orig)
 

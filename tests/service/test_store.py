@@ -192,6 +192,7 @@ def test_old_rows_are_deleted(url: str) -> None:
         service.clear_alert(alert.id, now=T0 + 1)
         service.step(T0 + 1)
         store.record(Picture(T0 + 2, tracks_at(T0 + 2, [50])), ())
+        until(lambda: store.writer_counters()["points"] >= 25, "the first day is written")
         day = T0 + 86400
         store.record(Picture(day + 100, tracks_at(day + 100, [50])), ())
         until(lambda: store.writer_counters()["points"] >= 26, "all is written")
@@ -259,6 +260,9 @@ def test_a_database_that_cannot_be_written_is_tried_again(sqlite_url: str, caplo
             service.update_alert(alert.id, text=str(k), now=T0 + 1 + k)
             service.step(T0 + 1 + k)
         assert store.writer_counters()["points_dropped"] > 0
+        assert [one["alert"]["text"] for one in store.alert_changes(alert.id)][1:] == [str(k) for k in range(60)]
+        assert [one["text"] for one in store.alerts("live", None, None)] == ["59"]
+        assert store.alerts("cleared", None, None) == []
         full[0] = False
         until(lambda: store.writer_counters()["alert_changes"] == 61, "the alerts are written")
         assert store.health().status == "ok"
