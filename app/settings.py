@@ -92,7 +92,7 @@ class PartsSettings(Section):
     extract: PartSettings = PartSettings(name="manhattan")
     associate: PartSettings = PartSettings(name="gnn")
     filter: PartSettings = PartSettings(name="kalman")
-    lifecycle: PartSettings = PartSettings(name="m_of_n")
+    lifecycle: PartSettings = PartSettings(name="score")
     classify: PartSettings = PartSettings(name="extent_speed")
     alert: tuple[PartSettings, ...] = (
         PartSettings(name="runway_occupied"),

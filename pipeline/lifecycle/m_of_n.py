@@ -1,99 +1,41 @@
-"""M-of-N confirmation, two-point start of the velocity, coasting and deletion."""
+"""M-of-N confirmation."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from pipeline.lifecycle.fading import Fading
 from pipeline.tables import TrackPhase
 from pipeline.track.contracts import Array, Floats
 
 
-@dataclass(frozen=True)
-class MOfN:
+@dataclass(frozen=True, kw_only=True)
+class MOfN(Fading):
     """A tentative track is confirmed by m hits within n looks and ends when that is out of reach.
 
-    start_speed_sd: m/s of each velocity component after one measurement. coast_after: looks in a row without a hit,
-    or coast_silence s without any measurement, after which a confirmed track is coasting. delete_misses looks in a
-    row, or delete_silence s (identified_silence s when a report has named it), end it; so does a position
-    standard deviation above max_position_sd m.
-    Source: Bar-Shalom, Li, Kirubarajan, 5.5.3 (two-point differencing); Blackman and Popoli, 6.2 (M of N).
+    The other settings are those of `Fading`. Source: Blackman and Popoli, 6.2 (M of N).
     """
 
     m: int = 4
     n: int = 6
-    start_speed_sd: float = 25.0
-    coast_after: int = 2
-    coast_silence: float = 2.5
-    delete_misses: int = 8
-    delete_silence: float = 10.0
-    identified_silence: float = 20.0
-    max_position_sd: float = 120.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not 1 <= self.m <= self.n <= 32:
             raise ValueError("m and n must satisfy 1 <= m <= n <= 32")
-        if not 0 < self.coast_after <= self.delete_misses:
-            raise ValueError("coast_after must be positive and not above delete_misses")
-        if not 0 < self.coast_silence <= self.delete_silence <= self.identified_silence:
-            raise ValueError("coast_silence, delete_silence and identified_silence must be positive and ascend")
-        if not (self.start_speed_sd > 0 and self.max_position_sd > 0):
-            raise ValueError("start_speed_sd and max_position_sd must be positive")
-
-    def start(self, position: Floats, noise: Floats) -> tuple[Floats, Floats]:
-        """State (n, 4) at rest and covariance (n, 4, 4) of tracks begun by a position (n, 2) with noise (n, 2, 2)."""
-        state, covariance = np.zeros((len(position), 4)), np.zeros((len(position), 4, 4))
-        state[:, :2] = position
-        covariance[:, :2, :2] = noise
-        covariance[:, 2, 2] = covariance[:, 3, 3] = self.start_speed_sd**2
-        return state, covariance
-
-    def second(
-        self, state: Floats, covariance: Floats, dt: Floats, position: Floats, noise: Floats
-    ) -> tuple[Floats, Floats]:
-        """Two-point start: state and covariance at the second measurement, dt (n,) > 0 s after the first."""
-        out_state, out_covariance = np.empty_like(state), np.empty_like(covariance)
-        _two_points(state, covariance, dt, position, noise, out_state, out_covariance)
-        return out_state, out_covariance
 
     def judge(
         self, phase: Array, history: Array, looks: Array, misses: Array, silence: Floats, identified: Array,
-        position_sd: Floats,
+        position_sd: Floats, score: Floats,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """The new TrackPhase (n,) and the mask of tracks that end.
-
-        history: (n,) uint32, newest look in bit 0, set for a hit. looks: how many bits count. misses: looks in a row
-        without a hit. silence: s since the last measurement. identified: named by a report. position_sd: m.
-        """
+        """The new TrackPhase (n,) and the mask of tracks that end; `score` is not asked. See `LifecyclePart`."""
         recent = np.minimum(looks, self.n)
         hits = np.bitwise_count(history & np.uint32((1 << self.n) - 1))
-        tentative = phase == TrackPhase.TENTATIVE
-        confirmed = ~tentative | (hits >= self.m)
-        coasting = (misses >= self.coast_after) | (silence > self.coast_silence)
-        made = np.where(confirmed, np.where(coasting, TrackPhase.COASTING, TrackPhase.CONFIRMED), phase)
-        hopeless = ~confirmed & (recent - hits > self.n - self.m)
-        patience = np.where(identified, self.identified_silence, self.delete_silence)
-        silent = silence > np.where(confirmed, patience, min(self.delete_silence, 2 * self.coast_silence))
-        missed = confirmed & (misses >= self.delete_misses) & ~identified
-        return made.astype(np.uint8), hopeless | silent | missed | ~(position_sd <= self.max_position_sd)
+        confirmed = (phase != TrackPhase.TENTATIVE) | (hits >= self.m)
+        made, ended = self.fade(phase, confirmed, misses, silence, identified, position_sd)
+        return made, ended | (~confirmed & (recent - hits > self.n - self.m))
 
 
 PART = MOfN
-
-
-@njit(nogil=True, cache=True)
-def _two_points(
-    state: Floats, cov: Floats, dt: Floats, position: Floats, noise: Floats, out_state: Floats, out_cov: Floats
-) -> None:
-    for k in range(len(state)):
-        t = dt[k]
-        for i in range(2):
-            out_state[k, i] = position[k, i]
-            out_state[k, 2 + i] = (position[k, i] - state[k, i]) / t
-            for j in range(2):
-                out_cov[k, i, j] = noise[k, i, j]
-                out_cov[k, i, 2 + j] = noise[k, i, j] / t
-                out_cov[k, 2 + i, j] = noise[k, i, j] / t
-                out_cov[k, 2 + i, 2 + j] = (noise[k, i, j] + cov[k, i, j]) / (t * t)

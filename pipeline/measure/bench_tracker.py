@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from statistics import median
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from pipeline.airport.model import Airport, SurfaceKind, TaxiGraph
 from pipeline.associate.gnn import GlobalNearestNeighbour
 from pipeline.classify.extent_speed import ExtentSpeed
 from pipeline.filter.kalman import Kalman
-from pipeline.lifecycle.m_of_n import MOfN
+from pipeline.lifecycle.score import Score
 from pipeline.sites import RadarSite
 from pipeline.tables import Plots, SectorPlots, VideoFormat
 from pipeline.track.contracts import Array, Expected, Floats, Measured
@@ -126,7 +125,7 @@ def make_bench_tracker() -> Tracker:
         (),
         filter=Kalman(),
         associate=GlobalNearestNeighbour(),
-        lifecycle=MOfN(),
+        lifecycle=Score(),
         classify=ExtentSpeed(),
         zones=_Pavement(),
     )
@@ -176,7 +175,7 @@ def _whole(
         looking.append(clock() - begin)
         counts.append(len(plots))
     settled = scans // 3
-    return median(spent[settled:]), len(reported), int(median(counts)), median(looking[settled:])
+    return float(np.median(spent[settled:])), len(reported), int(np.median(counts)), float(np.median(looking[settled:]))
 
 
 def _parts(clock: Callable[[], float], targets: int, scans: int, seed: int) -> tuple[float, float]:
@@ -203,7 +202,7 @@ def _parts(clock: Callable[[], float], targets: int, scans: int, seed: int) -> t
         associate(expected, measured)
         filtering.append(middle - begin)
         associating.append(clock() - middle)
-    return median(filtering[1:]), median(associating[1:])
+    return float(np.median(filtering[1:])), float(np.median(associating[1:]))
 
 
 def _filterpy(clock: Callable[[], float], targets: int) -> float:
@@ -226,4 +225,4 @@ def _filterpy(clock: Callable[[], float], targets: int) -> float:
             one.predict()
             one.update(np.array([1.0, 2.0]))
         spent.append(clock() - begin)
-    return median(spent)
+    return float(np.median(spent))

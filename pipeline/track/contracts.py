@@ -92,9 +92,14 @@ class LifecyclePart(Protocol):
 
     def judge(
         self, phase: Array, history: Array, looks: Array, misses: Array, silence: Floats, identified: Array,
-        position_sd: Floats,
+        position_sd: Floats, score: Floats,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """The new phase of each track, and which tracks end."""
+        """The new TrackPhase (n,) of each track, and the mask of tracks that end.
+
+        history: (n,) uint32, newest look in bit 0, set for a hit. looks: how many bits count. misses: looks in a row
+        without a hit. silence: s since the last measurement. identified: named by a report. position_sd: m.
+        score: natural logarithm of how much better a target explains the plots than false plots do.
+        """
 
 
 class ClassifyPart(Protocol):

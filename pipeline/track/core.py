@@ -12,6 +12,7 @@ import numpy as np
 from pipeline.sites import NodeSite, RadarSite
 from pipeline.tables import Plots, Source, TrackPhase
 from pipeline.track.contracts import Array, AssociatePart, ClassifyPart, FilterPart, Floats, LifecyclePart
+from pipeline.track.false_plots import FalsePlots
 from pipeline.track.look import RadarClock
 from pipeline.track.shape import ShapeRule, extents
 from pipeline.track.table import NEVER, TrackNumbers, TrackTable
@@ -44,9 +45,14 @@ class TrackerSettings:
     radar_ceiling: above this height a radar's miss says nothing. source_memory: how long a contribution is shown.
     report_gate: squared distance up to which a known address may stay on its track. report_patience: reports in a row
     against it that move an identity. ambiguity: a report whose two best tracks differ by less waits report_patience.
-    identity_hold: a name unheard for so long is dropped. report_range, report_ceiling: reports beyond are dropped.
+    identity_hold: a name unheard for so long is dropped; after name_holds it no longer keeps a track that radars miss.
+    report_range, report_ceiling: reports beyond are dropped.
     lane_half_width: standard deviation of a node event across its lane. merge_after: checks, one a second, after
-    which two tracks of one target become one.
+    which two tracks of one target become one. detection: probability that a look of a radar finds a target.
+    false_on_pavement, false_elsewhere: false plots a m^2 and turn, at least; elsewhere more is learnt. cell_scores:
+    what a plot of one, two, ... cells adds to the score of a track, the last for all larger ones. other_sensor: what
+    a node event or a report adds. aircraft_length: what is longer is reported off the pavement and starts tracks on
+    buildings.
     """
 
     max_lag: float = 3.0
@@ -63,16 +69,24 @@ class TrackerSettings:
     report_patience: int = 3
     ambiguity: float = 3.0
     identity_hold: float = 120.0
+    name_holds: float = 20.0
     report_range: float = 40_000.0
     report_ceiling: float = 3_000.0
     lane_half_width: float = 6.0
     merge_after: int = 3
+    detection: float = 0.9
+    false_on_pavement: float = 1e-6
+    false_elsewhere: float = 2e-5
+    cell_scores: tuple[float, ...] = (-2.0, 0.5, 1.5, 2.5)
+    other_sensor: float = 6.0
+    aircraft_length: float = 12.0
     shape: ShapeRule = field(default_factory=ShapeRule)
 
 
 @dataclass(slots=True)
 class Core:
     """The whole state of a tracker and what it works with. waiting: plots of each radar not decided on yet.
+    false_plots: where each radar makes false plots.
 
     undecided: address -> (uid of the best track, reports in a row that chose it). time: newest time taken, UTC s.
     """
@@ -89,6 +103,7 @@ class Core:
     numbers: TrackNumbers
     clocks: list[RadarClock]
     waiting: list[Plots]
+    false_plots: list[FalsePlots]
     counters: dict[str, int]
     undecided: dict[str, tuple[int, int]] = field(default_factory=dict)
     time: float = NEVER
@@ -146,6 +161,8 @@ def take(core: Core, rows: Array, time: Floats, position: Floats, noise: Floats,
     table.misses[rows] = 0
     table.history[rows] = (table.history[rows] << np.uint32(1)) | np.uint32(1)
     table.looks[rows] += 1
+    if source != Source.RADAR:
+        table.score[rows] += core.settings.other_sensor
     heard = getattr(table, SOURCE_TIMES[source])
     heard[rows] = np.maximum(heard[rows], time)
     way = np.hypot(*(table.state[rows, :2] - table.birthplace[rows]).T)
@@ -170,6 +187,7 @@ def start(
     table.hits[made] = 1
     table.looks[made] = 1 + head_start
     table.history[made] = (1 << (1 + head_start)) - 1
+    table.score[made] = 0.0 if source == Source.RADAR else (1 + head_start) * core.settings.other_sensor / 2
     table.simulated[made] = np.broadcast_to(simulated, (len(time),))[:k]
     for number, clock in enumerate(core.clocks):
         table.looked[number, made] = clock.closed_to - core.radars[number].video.azimuths // 2
@@ -196,16 +214,31 @@ def judge(core: Core) -> None:
         table.looks[:n],
         table.misses[:n],
         silence,
-        table.address[:n] != "",
+        (table.address[:n] != "") & (table.report_time[:n] >= core.time - core.settings.name_holds),
         spread,
+        table.score[:n],
     )
     ended |= bad
+    _learn(core, ended & (phase == TrackPhase.TENTATIVE))
     table.phase[:n] = phase
     for row in np.flatnonzero((phase != TrackPhase.TENTATIVE) & (table.id[:n] == 0) & ~ended):
         table.id[row] = core.numbers.take(core.time)
         core.count("confirmed")
         core.count("no_number", int(table.id[row] == 0))
     end(core, ended)
+
+
+def _learn(core: Core, ended: Array) -> None:
+    """Tracks that came to nothing were false plots: where they began and where they ended."""
+    table, n = core.table, core.table.n
+    alone = ended & (np.maximum(table.node_time[:n], table.report_time[:n]) == NEVER)
+    rows = np.flatnonzero(alone & ~(table.length[:n] > core.settings.aircraft_length))
+    if len(rows):
+        each = 0.5 * table.hits[rows]
+        for number, falses in enumerate(core.false_plots):
+            mine = table.radar[rows] == number
+            falses.learn(table.birthplace[rows[mine]], each[mine])
+            falses.learn(table.state[rows[mine], :2], each[mine])
 
 
 def end(core: Core, ended: Array) -> None:
@@ -246,5 +279,6 @@ def make_core(
         numbers=TrackNumbers(),
         clocks=[RadarClock(one.video.period_s) for one in radars],
         waiting=[Plots.empty() for _ in radars],
+        false_plots=[FalsePlots.around(one) for one in radars],
         counters={},
     )

@@ -14,6 +14,9 @@ from pipeline.track.core import Core, start, take
 from pipeline.track.look import Looks, RadarClock, plan_looks
 from pipeline.track.shape import oriented_noise, plot_extents, reshape
 
+PAVED = (SurfaceKind.RUNWAY, SurfaceKind.TAXIWAY, SurfaceKind.APRON, SurfaceKind.ROAD)
+"""Where targets are at home and false plots are few."""
+
 SETTLED = 3
 """Extents seen before a track's own extent may absorb plots."""
 
@@ -24,6 +27,7 @@ def take_sector(core: Core, sector: SectorPlots) -> None:
         return
     site, clock = core.radars[sector.radar], core.clocks[sector.radar]
     clock.heard(sector.closed_to, sector.time, site.video.azimuths, site.video.period_s)
+    core.false_plots[sector.radar].turn(sector.closed_to, site.video.azimuths)
     core.time = max(core.time, sector.time)
     core.count("sector_degraded", int(sector.degraded))
     fresh = _usable(core, sector)
@@ -133,6 +137,7 @@ def _decide(core: Core, sector: SectorPlots, plots: Plots, plot_rows: Array) -> 
     core.count("absorbed", int((owner >= 0).sum()))
     owning = np.full(len(left), -1, np.int64)
     owning[owner >= 0] = near[owner[owner >= 0]]
+    _score(core, sector.radar, near[due], taken, answer.distance[due], covariance[due], plots)
     _hit(core, near[due], taken, plots, position, noise, shape, left, owning)
     _miss(core, near[due][taken < 0], looks)
     table.looked[radar, near[due]] = looks.row[near[due]]
@@ -140,6 +145,28 @@ def _decide(core: Core, sector: SectorPlots, plots: Plots, plot_rows: Array) -> 
     table.looked[radar, :n][out] = looks.row[out]
     _begin(core, sector, plots[left[owner < 0]], plot_rows[left[owner < 0]], position[left[owner < 0]])
     return wait
+
+
+def _score(
+    core: Core, radar: int, rows: Array, taken: Array, squared: Floats, covariance: Floats, plots: Plots
+) -> None:
+    """The tracks `rows` (k,) took the plots `taken` (k,), -1 for none: what that says about whether they are real."""
+    table, settings = core.table, core.settings
+    young = np.flatnonzero(table.phase[rows] == TrackPhase.TENTATIVE)
+    if not len(young):
+        return
+    rows, taken = rows[young], taken[young]
+    hit = taken >= 0
+    table.score[rows[~hit]] += math.log(1.0 - settings.detection)
+    rows, plot, young = rows[hit], taken[hit], young[hit]
+    spread = covariance[young, :2, :2] + plots.covariance[plot]
+    place = np.stack([plots.east[plot], plots.north[plot]], axis=1)
+    paved = np.isin(core.zones.kind(place[:, 0], place[:, 1]), PAVED)
+    learnt = core.false_plots[radar].density(place)
+    false = np.where(paved, settings.false_on_pavement, np.maximum(learnt, settings.false_elsewhere))
+    volume = 2 * math.pi * np.sqrt(spread[:, 0, 0] * spread[:, 1, 1] - spread[:, 0, 1] ** 2)
+    cells = np.array(settings.cell_scores)[np.clip(plots.cells[plot], 1, len(settings.cell_scores)) - 1]
+    table.score[rows] += np.log(settings.detection / (volume * false)) - 0.5 * squared[young] + cells
 
 
 def owners(
@@ -227,6 +254,7 @@ def _begin(core: Core, sector: SectorPlots, plots: Plots, plot_rows: Array, posi
         return
     if core.settings.ignore_plots_on_buildings:
         built = core.zones.kind(plots.east, plots.north) == SurfaceKind.BUILDING
+        built &= ~(plots.length >= core.settings.aircraft_length)
         core.count("plot_on_building", int(built.sum()))
         if built.any():
             plots, plot_rows, position = plots[~built], plot_rows[~built], position[~built]
@@ -234,6 +262,7 @@ def _begin(core: Core, sector: SectorPlots, plots: Plots, plot_rows: Array, posi
     noise = oriented_noise(plots.covariance, shape, core.settings.wander)
     made = start(core, plots.time, position, noise, Source.RADAR, core.radars[sector.radar].simulated)
     k = made.stop - made.start
+    core.table.radar[made] = sector.radar
     core.table.looked[sector.radar, made] = plot_rows[:k]
     core.table.length[made], core.table.width[made] = shape[:k, 0], shape[:k, 1]
     core.table.axis[made] = shape[:k, 2] % math.pi

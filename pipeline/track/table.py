@@ -27,6 +27,7 @@ _COLUMNS: dict[str, tuple[str, tuple[int, ...], Any]] = {
     "misses": ("i4", (), 0),
     "history": ("u4", (), 0),
     "looks": ("i4", (), 0),
+    "score": ("f8", (), 0.0),
     "length": ("f8", (), np.nan),
     "width": ("f8", (), np.nan),
     "heading": ("f8", (), np.nan),
@@ -45,6 +46,7 @@ _COLUMNS: dict[str, tuple[str, tuple[int, ...], Any]] = {
     "report_time": ("f8", (), NEVER),
     "simulated": ("?", (), False),
     "twin": ("i4", (), 0),
+    "radar": ("i2", (), -1),
 }
 
 
@@ -53,8 +55,10 @@ class TrackTable:
 
     looked: (radars, capacity) int64, absolute row of each radar's last look at the track.
     one_point: the velocity is not known yet. birthplace: where it was first seen. history: hits by look, newest in
-    bit 0. axis: rad modulo pi, long axis as the radar sees it. shapes: extents seen. claimed: TargetCategory of its
-    reports. doubt: reports in a row that did not fit. twin: checks in a row that found it to double another.
+    bit 0. score: logarithm of how much better a target explains its plots than false plots do, kept until it is
+    confirmed. axis: rad modulo pi, long axis as the radar sees it. shapes: extents seen. claimed: TargetCategory of
+    its reports. doubt: reports in a row that did not fit. twin: checks in a row that found it to double another.
+    radar: index of the radar whose plot began it, -1 for another sensor.
     The other columns are those of `Tracks`.
     """
 
@@ -73,6 +77,7 @@ class TrackTable:
     misses: Array
     history: Array
     looks: Array
+    score: Array
     length: Array
     width: Array
     heading: Array
@@ -91,6 +96,7 @@ class TrackTable:
     report_time: Array
     simulated: Array
     twin: Array
+    radar: Array
 
     def __init__(self, capacity: int, radars: int) -> None:
         self.capacity = capacity

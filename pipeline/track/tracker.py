@@ -9,20 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.airport.model import Airport, SurfaceKind
+from pipeline.airport.model import Airport
 from pipeline.sites import NodeSite, RadarSite
 from pipeline.tables import NodeEvents, Plots, SectorPlots, TargetReports, TrackPhase, Tracks
 from pipeline.track.contracts import Array, AssociatePart, ClassifyPart, FilterPart, LifecyclePart
 from pipeline.track.core import SOURCE_TIMES, Core, TrackerSettings, ZoneLookup, judge, make_core
 from pipeline.track.housekeeping import keep_house
 from pipeline.track.node_update import take_node_events
-from pipeline.track.radar_update import take_sector
+from pipeline.track.radar_update import PAVED, SETTLED, take_sector
 from pipeline.track.report_update import take_target_reports
 from pipeline.track.table import NEVER
 
-PAVED = (SurfaceKind.RUNWAY, SurfaceKind.TAXIWAY, SurfaceKind.APRON, SurfaceKind.ROAD)
 _SAME = ("id", "phase", "updated", "born", "hits", "misses", "altitude", "on_ground", "category", "address", "callsign")
-_SAVED = ("numbers", "clocks", "waiting", "undecided", "time", "judged", "checked")
+_SAVED = ("numbers", "clocks", "waiting", "false_plots", "undecided", "time", "judged", "checked")
 
 
 class Tracker:
@@ -127,6 +126,7 @@ class Tracker:
             return np.ones(len(rows), np.bool_)
         known = table.moved[rows] | (table.address[rows] != "") | (table.node_time[rows] > NEVER)
         known |= table.report_time[rows] > NEVER
+        known |= (table.length[rows] >= core.settings.aircraft_length) & (table.shapes[rows] >= SETTLED)
         return np.asarray(known | np.isin(core.zones.kind(state[:, 0], state[:, 1]), PAVED))
 
     def save(self) -> dict[str, Any]:

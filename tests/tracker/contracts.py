@@ -114,6 +114,7 @@ class LifecycleContract:
     def judge(self, **given: Any) -> tuple[int, bool]:
         row: dict[str, Any] = {
             "phase": 0, "history": 1, "looks": 1, "misses": 0, "silence": 0.0, "identified": False, "position_sd": 3.0,
+            "score": 0.0,
         } | given  # fmt: skip
         kinds = {"phase": "u1", "history": "u4", "looks": "i4", "misses": "i4", "identified": "?"}
         phase, ended = self.part.judge(**{k: np.array([v], dtype=kinds.get(k, "f8")) for k, v in row.items()})
@@ -121,7 +122,7 @@ class LifecycleContract:
 
     def test_one_hit_is_tentative_and_many_confirm(self) -> None:
         assert self.judge() == (TrackPhase.TENTATIVE, False)
-        assert self.judge(history=0xFFFFFFFF, looks=32) == (TrackPhase.CONFIRMED, False)
+        assert self.judge(history=0xFFFFFFFF, looks=32, score=100.0) == (TrackPhase.CONFIRMED, False)
 
     def test_misses_coast_then_end_and_a_hit_brings_back(self) -> None:
         confirmed = {"phase": TrackPhase.CONFIRMED, "looks": 40, "history": 0}

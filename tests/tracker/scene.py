@@ -14,7 +14,7 @@ from pipeline.airport.model import Airport, SurfaceKind, TaxiGraph
 from pipeline.associate.gnn import GlobalNearestNeighbour
 from pipeline.classify.extent_speed import ExtentSpeed
 from pipeline.filter.kalman import Kalman
-from pipeline.lifecycle.m_of_n import MOfN
+from pipeline.lifecycle.score import Score
 from pipeline.sites import NodeSite, RadarSite
 from pipeline.tables import Plots, SectorPlots, VideoFormat
 from pipeline.track.tracker import Tracker
@@ -140,7 +140,7 @@ def split_scan(plots: Plots, scan: int, sectors: int, site: RadarSite = RADAR, r
 
 def make_tracker(nodes: Sequence[NodeSite] = (), radars: Sequence[RadarSite] = (RADAR,), **words: Any) -> Tracker:
     given: dict[str, Any] = {
-        "filter": Kalman(), "associate": GlobalNearestNeighbour(), "lifecycle": MOfN(), "classify": ExtentSpeed(),
+        "filter": Kalman(), "associate": GlobalNearestNeighbour(), "lifecycle": Score(), "classify": ExtentSpeed(),
         "zones": FlatZones(),
     }  # fmt: skip
     return Tracker(AIRPORT, radars, nodes, **(given | words))

@@ -5,6 +5,7 @@ import pytest
 
 from pipeline.classify.extent_speed import ExtentSpeed
 from pipeline.lifecycle.m_of_n import MOfN
+from pipeline.lifecycle.score import Score
 from pipeline.tables import TargetClass, TrackPhase
 from pipeline.track.table import TrackNumbers
 from tests.tracker.contracts import ClassifyContract, LifecycleContract
@@ -33,6 +34,27 @@ class TestMOfNContract(LifecycleContract):
         assert not self.judge(**confirmed, identified=True)[1]
 
 
+class TestScoreContract(LifecycleContract):
+    part = Score()
+
+    @pytest.mark.parametrize(
+        ("score", "history", "looks", "phase", "ended"),
+        [
+            (12.5, 0b111, 3, TrackPhase.CONFIRMED, False),
+            (12.5, 0b11, 2, TrackPhase.TENTATIVE, False),  # too few to know how it moves
+            (11.5, 0b1111, 4, TrackPhase.TENTATIVE, False),
+            (-5.5, 0b1000, 4, TrackPhase.TENTATIVE, True),
+            (9.0, 0b1010101, 15, TrackPhase.TENTATIVE, True),  # undecided for too long
+            (np.inf, 0b111, 3, TrackPhase.CONFIRMED, False),
+        ],
+    )
+    def test_the_score_decides(self, score: float, history: int, looks: int, phase: TrackPhase, ended: bool) -> None:
+        assert self.judge(score=score, history=history, looks=looks) == (phase, ended)
+
+    def test_what_is_confirmed_needs_no_score(self) -> None:
+        assert self.judge(score=-9.0, phase=TrackPhase.CONFIRMED) == (TrackPhase.CONFIRMED, False)
+
+
 class TestExtentSpeedContract(ClassifyContract):
     part = ExtentSpeed()
 
@@ -53,6 +75,12 @@ class TestExtentSpeedContract(ClassifyContract):
 def test_lifecycle_settings_out_of_bounds(words: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="must"):
         MOfN(**words)
+
+
+@pytest.mark.parametrize("words", [{"drop": 1.0}, {"confirm": np.nan}, {"least_hits": 40}, {"coast_after": 9}])
+def test_score_settings_out_of_bounds(words: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match="must"):
+        Score(**words)
 
 
 @pytest.mark.parametrize("words", [{"vehicle_length": 20.0}, {"vehicle_speed": 50.0}])

@@ -279,7 +279,7 @@ def test_what_stands_off_the_pavement_and_never_moved_is_not_reported_unless_wan
 
 
 def test_plots_on_buildings_start_nothing_and_are_counted() -> None:
-    tracker = run(make_tracker(), [Target(line(1000, 1000, 0, 0), 20, 20)], 10)
+    tracker = run(make_tracker(), [Target(line(1000, 1000, 0, 0), 8, 8)], 10)
     assert len(tracker.tracks()) == 0
     assert tracker.counters["plot_on_building"] == 10
 

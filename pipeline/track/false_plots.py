@@ -1,0 +1,99 @@
+"""How many false plots a radar makes where, learnt from tracks that came to nothing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from pipeline.sites import RadarSite
+from pipeline.track.contracts import Array, Floats
+
+REACH = 0.5
+"""A false plot strays by about this many cells of the grid, so it is shared among four."""
+
+
+@dataclass(slots=True, eq=False)
+class FalsePlots:
+    """False plots a turn in square cells of `step` m, as an average over about `memory` turns.
+
+    west, south: corner of the grid, m. rate: (rows, columns), multiplied by `scale`, which grows instead of all cells
+    fading one by one. turns: how many were averaged so far. closed: absolute row up to which turns were counted.
+    """
+
+    west: float
+    south: float
+    step: float
+    memory: float
+    rate: Floats
+    scale: float = 1.0
+    turns: int = 0
+    closed: int = 0
+
+    @classmethod
+    def around(cls, site: RadarSite, step: float = 12.0, memory: float = 60.0) -> FalsePlots:
+        """An empty map of all that a radar covers; `step` grows where there would be more than 1024 cells a side."""
+        reach = site.video.first_range_m + site.video.ranges * site.video.range_step_m + 2 * step
+        step = max(step, 2 * reach / 1024)
+        cells = math.ceil(2 * reach / step) + 1
+        return cls(site.east - reach, site.north - reach, step, memory, np.zeros((cells, cells)))
+
+    def turn(self, closed_to: int, azimuths: int) -> None:
+        """The antenna came to `closed_to`: at every whole turn the average moves on."""
+        if closed_to < self.closed or self.turns == 0:
+            self.closed = closed_to
+            self.turns = max(self.turns, 1)
+        while closed_to - self.closed >= azimuths:
+            self.closed += azimuths
+            self.turns += 1
+            self.scale /= 1.0 - self._gain
+        if self.scale > 1e9:
+            self.rate /= self.scale
+            self.scale = 1.0
+
+    @property
+    def _gain(self) -> float:
+        return max(1.0 / self.memory, 1.0 / (self.turns + 4.0))
+
+    def learn(self, place: Floats, plots: Floats) -> None:
+        """At these places (n, 2) there were so many false plots (n,)."""
+        _spread(self._cells(place), plots * (self._gain * self.scale), self.rate)
+
+    def density(self, place: Floats) -> Floats:
+        """(n,) false plots a square metre and turn at places (n, 2), as far as learnt."""
+        made = np.zeros(len(place))
+        _read(self._cells(place), self.rate, made)
+        return made / (self.scale * self.step**2)
+
+    def _cells(self, place: Floats) -> Floats:
+        return np.asarray((place - (self.west, self.south)) / self.step - REACH)
+
+
+@njit(nogil=True, cache=True)
+def _spread(cell: Floats, amount: Floats, rate: Floats) -> None:
+    rows, columns = rate.shape
+    for k in range(len(cell)):
+        x, y = cell[k, 0], cell[k, 1]
+        if not (0.0 <= x < columns - 1 and 0.0 <= y < rows - 1):
+            continue
+        i, j = int(y), int(x)
+        v, u = y - i, x - j
+        rate[i, j] += amount[k] * (1 - v) * (1 - u)
+        rate[i, j + 1] += amount[k] * (1 - v) * u
+        rate[i + 1, j] += amount[k] * v * (1 - u)
+        rate[i + 1, j + 1] += amount[k] * v * u
+
+
+@njit(nogil=True, cache=True)
+def _read(cell: Floats, rate: Floats, out: Array) -> None:
+    rows, columns = rate.shape
+    for k in range(len(cell)):
+        x, y = cell[k, 0], cell[k, 1]
+        if not (0.0 <= x < columns - 1 and 0.0 <= y < rows - 1):
+            continue
+        i, j = int(y), int(x)
+        v, u = y - i, x - j
+        low = rate[i, j] * (1 - u) + rate[i, j + 1] * u
+        out[k] = low * (1 - v) + (rate[i + 1, j] * (1 - u) + rate[i + 1, j + 1] * u) * v
