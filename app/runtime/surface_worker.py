@@ -21,6 +21,11 @@ log = logging.getLogger(__name__)
 IDLE_S = 0.25
 """Without input a picture is made this often, so that ages, coasting and health stay true."""
 
+SILENCE_S = 1.0
+"""When no sensor has spoken for so long, time passes without them; what they say next may be as old as the jitter."""
+
+JITTER_S = 0.5
+
 
 @dataclass(frozen=True, slots=True)
 class Command:
@@ -49,14 +54,11 @@ class SurfaceWorker:
         self._listeners: list[PictureListener] = []
         self._listening = threading.Lock()
         self._thread = threading.Thread(target=self._run, name="surface", daemon=True)
-        self._last_input = time.monotonic()
-        self._time_at_input = 0.0
+        self._heard: tuple[float, float] | None = None
         self._pending: list[AlertChange] = []
 
     def start(self) -> None:
-        """Begin; the engine's time starts at the present so that a silent start has a true clock."""
-        self.engine.advance(time.time())
-        self._time_at_input = self.engine.time
+        """Begin."""
         self._thread.start()
 
     def stop(self) -> None:
@@ -101,7 +103,7 @@ class SurfaceWorker:
                 return
             for item in items:
                 self._take(item)
-            self._let_time_pass(bool(items))
+            self._let_time_pass(any(not isinstance(item, Command) for item in items))
             self._look()
 
     def _take(self, item: SectorPlots | NodeEvents | TargetReports | Command) -> None:
@@ -127,12 +129,12 @@ class SurfaceWorker:
             command.answer.set_exception(error)
 
     def _let_time_pass(self, heard: bool) -> None:
+        """The engine's time comes with the data; only when all sensors are silent does this clock take over."""
         now = time.monotonic()
-        if heard and self.engine.time > self._time_at_input:
-            self._last_input, self._time_at_input = now, self.engine.time
-            return
-        if now - self._last_input > 2 * IDLE_S:
-            self.engine.advance(self._time_at_input + now - self._last_input)
+        if heard or self._heard is None:
+            self._heard = (now, self.engine.time) if self.engine.time else None
+        elif now - self._heard[0] > SILENCE_S:
+            self.engine.advance(self._heard[1] + now - self._heard[0] - JITTER_S)
 
     def _look(self) -> None:
         try:
@@ -143,7 +145,8 @@ class SurfaceWorker:
             self.failures += 1
             log.exception("no picture could be made")
             return
-        picture = replace(picture, sensors=sensors, timings={**self._timings(), **picture.timings})
+        now = picture.time or time.time()
+        picture = replace(picture, time=now, sensors=sensors, timings={**self._timings(), **picture.timings})
         self.newest = picture
         changes = (*self._pending, *changes)
         self._pending.clear()
