@@ -108,16 +108,21 @@ def along(line: LineString, run: Floats, turning: float = 1.0) -> tuple[Floats, 
     """(east, north, heading, speed) at the distances `run` (one a second) along the line.
 
     The direction of a run backwards is that of driving forwards there. turning: s over which a turn is spread.
+    On a closed line a run longer than it goes round again.
     """
     points = np.asarray(line.coords)[:, :2]
     steps = np.hypot(*np.diff(points, axis=0).T)
     reach = np.concatenate([[0.0], np.cumsum(steps)])
-    east, north = np.interp(run, reach, points[:, 0]), np.interp(run, reach, points[:, 1])
+
+    def place(at: Floats) -> tuple[Floats, Floats]:
+        within = np.mod(at, reach[-1]) if line.is_ring else np.clip(at, 0.0, reach[-1])
+        return np.interp(within, reach, points[:, 0]), np.interp(within, reach, points[:, 1])
+
+    east, north = place(run)
     moved = np.gradient(run)
-    ahead = np.clip(np.where(moved >= 0, run + 3.0, run - 3.0), 0.0, reach[-1])
-    behind = np.clip(np.where(moved >= 0, run - 3.0, run + 3.0), 0.0, reach[-1])
-    de = np.interp(ahead, reach, points[:, 0]) - np.interp(behind, reach, points[:, 0])
-    dn = np.interp(ahead, reach, points[:, 1]) - np.interp(behind, reach, points[:, 1])
+    sense = np.where(moved >= 0, 3.0, -3.0)
+    (east_ahead, north_ahead), (east_behind, north_behind) = place(run + sense), place(run - sense)
+    de, dn = east_ahead - east_behind, north_ahead - north_behind
     moving = np.abs(moved) > 0.05
     held = np.maximum.accumulate(np.where(moving, np.arange(len(run)), -1))
     first = int(np.argmax(moving)) if moving.any() else 0
@@ -150,7 +155,8 @@ def lap(
     spare = seconds - times * len(once)
     # the time that is left over is spent standing at the end of each round
     rounds = [np.concatenate([once, np.full(spare // times + (i < spare % times), once[-1])]) for i in range(times)]
-    run = np.concatenate(rounds)
+    # a closed line is driven on and on: a round that began at 0 again would be a leap in the distance run
+    run = np.concatenate([one + (0.0 if back else i * line.length) for i, one in enumerate(rounds)])
     return along(line, run, 1.0)
 
 

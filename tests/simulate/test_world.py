@@ -76,6 +76,7 @@ def test_nothing_moves_faster_than_its_kind_can() -> None:
         pace = np.hypot(then.east[b] - now.east[a], then.north[b] - now.north[a]) / 0.5
         aircraft = now.category[a] == TargetClass.AIRCRAFT
         assert pace[~aircraft].max(initial=0.0) < 16.0
+        assert now.speed[a][~aircraft].max(initial=0.0) < 16.0
         assert pace[aircraft].max(initial=0.0) < 125.0
 
 
@@ -183,6 +184,19 @@ def test_laps_fill_the_loop_exactly_and_close() -> None:
     east, north, _, _ = lap(road, 1000, np.random.default_rng(2), 8.0, back=False)
     assert len(east) == 1000
     assert math.hypot(east[0] - east[-1], north[0] - north[-1]) < 12.0
+
+
+def test_round_after_round_the_speed_is_that_of_the_positions() -> None:
+    (road,) = service_roads(field())
+    east, north, heading, pace = lap(road, 1000, np.random.default_rng(2), 8.0, back=False)
+    assert 2 * road.length < 1000 * 8.0  # more than one round
+    moved = np.hypot(np.diff(east), np.diff(north))
+    # a chord over a corner is shorter than the way
+    assert np.abs((pace[1:] + pace[:-1]) / 2 - moved).max() < 4.0
+    straight = moved > 6.0
+    course = np.arctan2(np.diff(east), np.diff(north))
+    turned = np.angle(np.exp(1j * (course - heading[:-1])))[straight]
+    assert np.percentile(np.abs(turned), 90) < 0.2
 
 
 @pytest.mark.parametrize("count", [50, 300])
