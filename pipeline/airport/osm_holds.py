@@ -30,6 +30,7 @@ REACH = 700.0
 """Metres of taxiway within which a position that is said to guard a runway must reach it."""
 UNTYPED_REACH = 260.0
 FURTHER_OUT = 300.0
+PASSED = 300.0
 LOW_VISIBILITY = ("ils", "cat", "critical")
 
 
@@ -57,14 +58,11 @@ def make_holds(
 ) -> list[Feature]:
     """TaxiwayHoldingPosition features, mapped ones first, then the derived ones; and the intermediate positions."""
     found = [_read(one, runways, lanes, features, frame) for one in elements if one.aeroway == "holding_position"]
-    walks = [
-        walk_outward(
-            lanes, one.strip(), one.centreline, [o.strip() for o in runways if o is not one], 400.0, (), one.width
-        )
-        for one in runways
-    ]
+    guarded = {one.lane for one in found if one.kind == "CAT_I" and one.lane is not None}
+    free = [_walk(one, runways, lanes, set()) for one in runways]
+    held = [_walk(one, runways, lanes, guarded) for one in runways]
     for hold in found:
-        _assign(hold, runways, walks, lanes)
+        _assign(hold, runways, lanes, free, held)
     kept = _without_repeats(found)
     derived = [one for number in range(len(runways)) for one in _derive(number, runways, kept, lanes, features)]
     kept += _without_repeats(derived)
@@ -110,17 +108,25 @@ def _take_taxiway(hold: _Hold, lanes: Lanes, features: Sequence[Feature]) -> Non
     hold.name = hold.name or features[owner].name
 
 
-def _assign(hold: _Hold, runways: Sequence[RunwayDraft], walks: Sequence[Access], lanes: Lanes) -> None:
+def _walk(runway: RunwayDraft, runways: Sequence[RunwayDraft], lanes: Lanes, blocked: set[int]) -> Access:
+    others = [one.strip() for one in runways if one is not runway]
+    return walk_outward(lanes, runway.strip(), runway.centreline, others, 400.0, blocked, runway.width)
+
+
+def _assign(
+    hold: _Hold, runways: Sequence[RunwayDraft], lanes: Lanes, free: Sequence[Access], held: Sequence[Access]
+) -> None:
+    """Find the runway. free, held: the ways to each runway, and those that pass no other position."""
     if hold.kind == "land_and_hold_short" or not runways:
         _turn_along(hold, lanes, None)
         return
     reach = {"untyped": UNTYPED_REACH, "intermediate": 0.0}.get(hold.kind, REACH)
-    lengths = [_way(one, hold, lanes, walk) for one, walk in zip(runways, walks, strict=True)]
+    ways = [_way(one, hold, *walks) for one, walks in zip(runways, zip(free, held, strict=True), strict=True)]
     for number, runway in enumerate(runways):
         if hold.wanted == runway.id and hold.kind != "intermediate" and runway.centreline.distance(hold.point) < 400.0:
             hold.runway = number
-    if hold.runway < 0 and min(lengths) <= reach:
-        hold.runway = int(np.argmin(lengths))
+    if hold.runway < 0 and min(length for length, _ in ways) <= reach:
+        hold.runway = min(range(len(ways)), key=lambda number: ways[number][0])
     if hold.runway < 0:
         hold.kind = "intermediate"
         _turn_along(hold, lanes, None)
@@ -129,17 +135,25 @@ def _assign(hold: _Hold, runways: Sequence[RunwayDraft], walks: Sequence[Access]
     if hold.kind == "untyped":
         far = 1.25 * HOLD_DISTANCE[runway.code]
         hold.kind = "CAT_I" if runway.centreline.distance(hold.point) < max(far, 120.0) else "CAT_II_III"
-    _turn_along(hold, lanes, runway, walks[hold.runway])
+    _turn_along(hold, lanes, runway, ways[hold.runway][1])
 
 
-def _way(runway: RunwayDraft, hold: _Hold, lanes: Lanes, walk: Access) -> float:
-    """Metres of taxiway to the runway; where the map has no taxiway, metres over the ground, held for a longer way."""
+def _way(runway: RunwayDraft, hold: _Hold, free: Access, held: Access) -> tuple[float, Access]:
+    """Metres of taxiway to the runway, and the walk they come from.
+
+    Where the map has no taxiway, metres over the ground, held for a longer way. A way past another position counts for
+    longer: it is the other one that guards the runway there.
+    """
     straight = float(runway.centreline.distance(hold.point)) - runway.width / 2
     if straight < 8.0:
-        return math.inf
+        return math.inf, free
     if hold.lane is None:
-        return 2.0 * straight if straight < 150.0 else math.inf
-    return walk.length.get(hold.lane, math.inf)
+        return (2.0 * straight if straight < 150.0 else math.inf), free
+    if hold.kind == "CAT_II_III":
+        return free.length.get(hold.lane, math.inf), free
+    if hold.lane in held.length:
+        return held.length[hold.lane], held
+    return free.length.get(hold.lane, math.inf) + PASSED, free
 
 
 def _turn_along(hold: _Hold, lanes: Lanes, runway: RunwayDraft | None, walk: Access | None = None) -> None:
@@ -150,11 +164,13 @@ def _turn_along(hold: _Hold, lanes: Lanes, runway: RunwayDraft | None, walk: Acc
     nearest = runway.centreline.interpolate(runway.centreline.project(hold.point))
     towards = np.array([nearest.x - hold.point.x, nearest.y - hold.point.y])
     towards = towards / max(float(np.hypot(*towards)), 1e-9)
+    if walk is not None and hold.lane in walk.before:
+        trail = walk.trace(hold.lane or 0, 8.0)  # the taxiway itself, round bends and at junctions
+        step = lanes.points[trail[-1]] - lanes.points[trail[0]]
+        hold.heading = math.atan2(step[0], step[1])
+        return
     ahead = np.array(lane) if lane else towards
     turn = float(ahead @ towards)
-    if abs(turn) < 0.25 and walk is not None and hold.lane in walk.length:
-        trail = walk.trace(hold.lane or 0, 15.0)  # the way round the runway's end: follow the taxiway
-        turn = float(ahead @ (lanes.points[trail[-1]] - lanes.points[trail[0]]))
     ahead = ahead if turn >= 0 else -ahead
     hold.heading = math.atan2(ahead[0], ahead[1])
 
@@ -176,7 +192,8 @@ def _derive(
 ) -> Iterator[_Hold]:
     runway = runways[number]
     mine = [one for one in known if one.runway == number and one.kind == "CAT_I"]
-    blocked = {one.lane for one in mine if one.lane is not None}
+    blocked = {one for hold in mine for one in lanes.crossing(_bar(hold))}
+    blocked |= {hold.lane for hold in mine if hold.lane is not None}
     others = [one.strip() for one in runways if one is not runway]
     distance = HOLD_DISTANCE[runway.code]
     walk = walk_outward(lanes, runway.strip(), runway.centreline, others, distance, blocked, runway.width)
@@ -225,11 +242,14 @@ def _held_further_out(lanes: Lanes, point: int, inner: int, holds: set[int]) -> 
     return True
 
 
-def _feature(hold: _Hold, runways: Sequence[RunwayDraft]) -> Feature:
-    half = hold.width / 2
-    across = np.array([math.cos(hold.heading), -math.sin(hold.heading)]) * half
+def _bar(hold: _Hold) -> LineString:
+    across = np.array([math.cos(hold.heading), -math.sin(hold.heading)]) * (hold.width / 2)
     centre = np.array([hold.point.x, hold.point.y])
-    line = LineString([centre - across, centre + across])
+    return LineString([centre - across, centre + across])
+
+
+def _feature(hold: _Hold, runways: Sequence[RunwayDraft]) -> Feature:
+    line = _bar(hold)
     heading = round(math.degrees(hold.heading) % 360, 1)
     properties: dict[str, object] = {"heading_deg": heading % 360, "source": hold.source}
     if hold.runway < 0:

@@ -18,8 +18,8 @@ from pipeline.airport.runway_access import Access, Lanes, walk_outward
 
 CLEARANCE = 16.0
 """Metres on both sides of a taxiway outside the holding positions that are not protected."""
-FURTHER = 45.0
-"""Metres that a holding position may lie beyond the distance and still bound the area."""
+FURTHER = 100.0
+"""Metres that a holding position may lie beyond the distance and still bound the area: it then follows the taxiway."""
 
 
 def protection_areas(
@@ -59,16 +59,21 @@ def _bounding(
     visibility: str,
 ) -> tuple[list[HoldingPosition], set[int]]:
     """The holding positions that bound the area, and their places on the lanes."""
-    place = {one.id: lanes.nearest((one.position.x, one.position.y), 20.0) for one in holds}
+    place = {one.id: _places(one, lanes) for one in holds}
     wanted = [one for one in holds if visibility == "low" or one.category == "CAT_I"]
     if visibility == "low":
         further = [one for one in holds if one.category == "CAT_II_III"]
-        nearer = {place[one.id]: one for one in holds if one.category == "CAT_I"}
-        blocked = {one for one in (place[one.id] for one in further) if one is not None}
+        nearer = [one for one in holds if one.category == "CAT_I"]
+        blocked = {point for one in further for point in place[one.id]}
         walk = walk_outward(lanes, runway.strip, runway.centreline, others, distance, blocked, runway.width)
         passed = {one for point, _ in walk.crossings for one in walk.trace(point, math.inf)}
-        wanted = further + [hold for point, hold in nearer.items() if point is None or point in passed]
-    return wanted, {one for one in (place[hold.id] for hold in wanted) if one is not None}
+        wanted = further + [one for one in nearer if not place[one.id] or place[one.id] & passed]
+    return wanted, {point for one in wanted for point in place[one.id]}
+
+
+def _places(hold: HoldingPosition, lanes: Lanes) -> set[int]:
+    nearest = lanes.nearest((hold.position.x, hold.position.y), 20.0)
+    return lanes.crossing(hold.line) | ({nearest} if nearest is not None else set())
 
 
 def _area(
@@ -80,15 +85,17 @@ def _area(
     box = axis.buffer(distance, cap_style="flat")
     ways = [_box(one, -200.0, 0.0) for one in holds if runway.strip.distance(one.position) < distance]
     ways.append(_outside(lanes, walk, box).buffer(CLEARANCE, cap_style="flat"))
-    in_front = [_box(one, 0.0, FURTHER + 10.0) for one in holds if _just_beyond(one, runway, distance)]
+    in_front = [_way_in(lanes, walk, point) for point in walk.held]
     area = shapely.unary_union([box, *in_front]).difference(shapely.unary_union(ways)).union(runway.strip)
     pieces = [one for one in shapely.get_parts(area) if isinstance(one, Polygon)]
     whole = max(pieces, key=lambda one: one.intersection(runway.strip).area)
     return Polygon(shapely.get_coordinates(Polygon(whole.exterior).simplify(0.5)))
 
 
-def _just_beyond(hold: HoldingPosition, runway: Runway, distance: float) -> bool:
-    return distance < runway.centreline.distance(hold.position) <= distance + FURTHER
+def _way_in(lanes: Lanes, walk: Access, point: int) -> BaseGeometry:
+    """The taxiway from a holding position to the runway."""
+    trail = walk.trace(point, math.inf)
+    return LineString(lanes.points[trail]).buffer(CLEARANCE, cap_style="flat") if len(trail) > 1 else Polygon()
 
 
 def _box(hold: HoldingPosition, low: float, high: float) -> Polygon:
@@ -98,7 +105,7 @@ def _box(hold: HoldingPosition, low: float, high: float) -> Polygon:
     return LineString([position + ahead * low, position + ahead * high]).buffer(CLEARANCE, cap_style="flat")
 
 
-def _outside(lanes: Lanes, walk: Access, area: BaseGeometry) -> MultiLineString:
+def _outside(lanes: Lanes, walk: Access, area: BaseGeometry) -> BaseGeometry:
     """The lanes near the area that were not walked: traffic there is not before this runway."""
     near = np.asarray(shapely.dwithin(shapely.points(lanes.points), area, CLEARANCE + 5.0))
     pieces = [
@@ -107,4 +114,4 @@ def _outside(lanes: Lanes, walk: Access, area: BaseGeometry) -> MultiLineString:
         for other, _ in lanes.neighbours[one]
         if other > one and not (walk.inside[one] and walk.inside[other])
     ]
-    return MultiLineString(pieces)
+    return shapely.line_merge(MultiLineString(pieces))

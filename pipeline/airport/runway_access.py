@@ -36,6 +36,15 @@ class Lanes:
         distance, index = self.tree.query(position)
         return int(index) if distance <= within else None
 
+    def crossing(self, line: LineString) -> set[int]:
+        """The points at which lanes cross a line: what a bar across a taxiway stops."""
+        if self.tree is None:
+            return set()
+        middle = line.interpolate(0.5, normalized=True)
+        near = self.tree.query_ball_point((middle.x, middle.y), line.length / 2 + STEP)
+        within = shapely.dwithin(shapely.points(self.points[near]), line, STEP / 2 + 0.1)
+        return {int(one) for one, is_at in zip(near, np.atleast_1d(within), strict=True) if is_at}
+
     def direction(self, point: int) -> tuple[float, float] | None:
         """A unit vector along the lane at a point."""
         around = [self.points[one] for one, _ in self.neighbours[point]]
@@ -144,6 +153,7 @@ def walk_outward(
             if other_point not in access.length:
                 heapq.heappush(queue, (0.0 if at_runway[other_point] else length + step, other_point, point))
     _leave_lanes_alongside(lanes, access, width, away)
+    access.inside |= at_runway | at_other  # a lane on the pavement of a runway that crosses is not outside
     return access
 
 

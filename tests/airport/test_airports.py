@@ -90,6 +90,9 @@ def test_who_waits_at_a_hold_is_outside_the_protection_area(code: str) -> None:
                 hold.position.x - 20 * math.sin(hold.heading), hold.position.y - 20 * math.cos(hold.heading)
             )
             assert not runway.protection["normal"].covers(behind), hold.id
+            if runway.centreline.distance(hold.position) < 180:
+                ahead = shapely.Point(2 * hold.position.x - behind.x, 2 * hold.position.y - behind.y)
+                assert runway.protection["normal"].covers(ahead), hold.id
 
 
 @every

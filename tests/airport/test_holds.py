@@ -157,6 +157,21 @@ def test_protection_reaches_to_the_holds_and_beyond_the_ends() -> None:
     assert low.covers(Point(300, middle + 130))
 
 
+@pytest.mark.parametrize("distance", [70, 110, 160])
+def test_whoever_has_passed_the_hold_is_inside_wherever_it_was_painted(distance: float) -> None:
+    """Some holds are painted far out (158 to 177 m at Orly): the area follows the taxiway to them, round a bend too."""
+    bent = taxiway([(0, 0), (0, 100), (120, 220), (120, 300)], ref="A1")
+    spot = (0, distance) if distance <= 100 else (distance - 100, distance)
+    hold = node(spot, aeroway="holding_position", holding_position__type="runway")
+    airport = made(runway(), bent, PARALLEL, hold)
+    (found,) = airport.holding_positions
+    ahead = (math.sin(found.heading), math.cos(found.heading))
+    area = airport.runways[0].protection["normal"]
+    for step in (12, 24, 36):
+        assert area.covers(Point(found.position.x + step * ahead[0], found.position.y + step * ahead[1]))
+        assert not area.covers(Point(found.position.x - step * ahead[0], found.position.y - step * ahead[1]))
+
+
 def test_distances_are_parameters() -> None:
     document = airport_geojson(extract(runway()), "TEST")
     airport = airport_from_geojson(document, normal_distance=60, low_visibility_distance=120, beyond_ends=10)
