@@ -98,6 +98,13 @@ def surface_engine(
     return SurfaceEngine(airport, radars, nodes, tracker, monitor, clock)
 
 
+def check_parts(settings: Settings) -> None:
+    """Build every chosen part once, so that a wrong name or setting stops the start. Raises SettingsError."""
+    for verb, chosen in settings.parts:
+        for one in chosen if isinstance(chosen, tuple) else (chosen,):
+            _part(verb, one)
+
+
 def _part(verb: str, chosen: PartSettings) -> Any:
     try:
         return parts.build(verb, chosen.name, chosen.settings())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import signal
 import threading
 import time
 from collections.abc import Callable
@@ -20,7 +21,7 @@ from app.bus import connect_bus
 from app.ingest.mqtt import MqttThread
 from app.live.hub import Hub
 from app.service import SurfaceService
-from app.settings import Settings
+from app.settings import Settings, SettingsError
 from app.store.store import Store
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ class Running:
         service.checks["database"] = True
         step("kernels: compiling or loading from the cache")
         service.prepare(first_alert=store.last_alert_id() + 1)
-        service.extra_counters["store"] = store.writer_counters
+        service.extra_sensors.append(store.health)
         service.keep_node_events = store.record_node_events
         service.listen(store.record)
         service.listen(self.hub.publish)
@@ -69,7 +70,11 @@ class Running:
             self._ends.callback(self.view3d.stop)
             view = self.view3d
             service.listen(lambda picture, _changes: view.update(picture))
-        bus = connect_bus(self.settings.bus_url, service)
+        try:
+            bus = connect_bus(self.settings.bus_url, service)
+        except ValueError as error:
+            raise SettingsError(f"bus_url: {error}") from error
+        service.extra_counters["bus"] = bus.counters
         self._ends.callback(bus.close)
         step("sensors: opening the sockets")
         service.start()
@@ -124,6 +129,9 @@ def serve(settings: Settings, console: Console) -> int:
             log.error("start-up failed: %s", error, exc_info=settings.log_level == "debug")
             server.should_exit = True
 
+    # uvicorn raises the signal that ended it once more, which would end us before the store has drained
+    for one in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(one, lambda *_: None)
     starter = threading.Thread(target=start, name="start-up")
     starter.start()
     try:

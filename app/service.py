@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from app.assembly import node_site, radar_chain, radar_site, surface_engine
+from app.assembly import check_parts, node_site, radar_chain, radar_site, surface_engine
 from app.contract import PictureListener, Readiness, Refused, UnknownId, Video
 from app.ingest.octets import OctetIntake
 from app.ingest.udp import VideoReceiver
@@ -27,9 +27,13 @@ SENSOR_SILENT_S = 10.0
 
 
 class SurfaceService:
-    """One airport, running. Made cold; `prepare` warms it, `start` starts its threads, `stop` ends them."""
+    """One airport, running. Made cold; `prepare` warms it, `start` starts its threads, `stop` ends them.
+
+    Raises SettingsError when the settings name a part or a setting of one that does not exist.
+    """
 
     def __init__(self, settings: Settings, airport: Airport, airport_geojson: dict[str, Any]) -> None:
+        check_parts(settings)
         self.settings = settings
         self.airport = airport
         self.airport_geojson = airport_geojson
@@ -37,6 +41,7 @@ class SurfaceService:
         self.nodes = tuple(node_site(one, airport) for one in settings.nodes)
         self.checks = {"database": False, "warm": False, "picture": False}
         self.extra_counters: dict[str, Callable[[], dict[str, int]]] = {}
+        self.extra_sensors: list[Callable[[], SensorState]] = []
         self.keep_node_events: Callable[[NodeEvents], None] = lambda events: None
         self._workers: dict[str, RadarWorker] = {}
         self._receivers: dict[str, VideoReceiver] = {}
@@ -103,14 +108,14 @@ class SurfaceService:
         return self._running.listen(listener)
 
     def sensors(self) -> tuple[SensorState, ...]:
-        """The health of every radar, of the pavement nodes and of the target reports."""
+        """The health of every radar, the pavement nodes, the target reports, the tracker and what else was added."""
         radars = tuple(self._radar_state(site) for site in self.radars)
         others = []
         if self.nodes:
             others.append(self._feed_state("nodes", "node", all(node.simulated for node in self.nodes)))
         if "reports" in self._heard:
             others.append(self._feed_state("reports", "report", False))
-        return (*radars, *others, self._surface_state())
+        return (*radars, *others, self._surface_state(), *(one() for one in self.extra_sensors))
 
     def video(self, radar: str) -> Video:
         """The newest turn of a radar."""

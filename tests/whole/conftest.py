@@ -77,6 +77,7 @@ def launch(mode: str, data: Path, *words: str, **environment: str) -> Airside:
             "AIRSIDE_DATA_DIR": str(data),
             "AIRSIDE_DEMO__UDP_PORT": str(udp_port),
             "AIRSIDE_DEMO__FIRST_INCIDENT_S": "20",
+            "AIRSIDE_VIEW3D": "false",
             **environment,
         },
     )
