@@ -51,8 +51,8 @@ class TrackerSettings:
     which two tracks of one target become one. detection: probability that a look of a radar finds a target.
     false_on_pavement, false_elsewhere: false plots a m^2 and turn, at least; elsewhere more is learnt. cell_scores:
     what a plot of one, two, ... cells adds to the score of a track, the last for all larger ones. other_sensor: what
-    a node event or a report adds. aircraft_length: what is longer is reported off the pavement and starts tracks on
-    buildings.
+    a node event or a report adds. most_score: it grows no further. aircraft_length: what is longer is reported off
+    the pavement and starts tracks on buildings.
     """
 
     max_lag: float = 3.0
@@ -69,7 +69,7 @@ class TrackerSettings:
     report_patience: int = 3
     ambiguity: float = 3.0
     identity_hold: float = 120.0
-    name_holds: float = 20.0
+    name_holds: float = 10.0
     report_range: float = 40_000.0
     report_ceiling: float = 3_000.0
     lane_half_width: float = 6.0
@@ -79,6 +79,7 @@ class TrackerSettings:
     false_elsewhere: float = 2e-5
     cell_scores: tuple[float, ...] = (-2.0, 0.5, 1.5, 2.5)
     other_sensor: float = 6.0
+    most_score: float = 20.0
     aircraft_length: float = 12.0
     shape: ShapeRule = field(default_factory=ShapeRule)
 
@@ -121,8 +122,10 @@ class Core:
         return made
 
     def extents(self, rows: Array | slice = slice(None)) -> Floats:
-        """(k, 3) length, width, direction of tracks; zeros where unknown."""
-        return extents(*(self.column(name)[rows] for name in ("length", "width", "heading", "axis")))
+        """(k, 3) length, width, direction of tracks for gating; zeros where unknown, those seen in parts whole."""
+        made = extents(*(self.column(name)[rows] for name in ("length", "width", "heading", "axis")))
+        np.maximum(made[:, :2], 2.0 * self.column("body")[rows][:, None], out=made[:, :2])
+        return made
 
     @property
     def timed(self) -> bool:
@@ -162,7 +165,7 @@ def take(core: Core, rows: Array, time: Floats, position: Floats, noise: Floats,
     table.history[rows] = (table.history[rows] << np.uint32(1)) | np.uint32(1)
     table.looks[rows] += 1
     if source != Source.RADAR:
-        table.score[rows] += core.settings.other_sensor
+        table.score[rows] = np.minimum(table.score[rows] + core.settings.other_sensor, core.settings.most_score)
     heard = getattr(table, SOURCE_TIMES[source])
     heard[rows] = np.maximum(heard[rows], time)
     way = np.hypot(*(table.state[rows, :2] - table.birthplace[rows]).T)

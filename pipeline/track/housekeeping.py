@@ -8,6 +8,7 @@ from numba import njit
 from pipeline.tables import TrackPhase
 from pipeline.track.contracts import Array, Expected, Floats
 from pipeline.track.core import Core, end, judge, strip_identity
+from pipeline.track.parts import absorb, join_parts
 from pipeline.track.radar_update import owners
 from pipeline.track.table import NEVER
 
@@ -32,6 +33,7 @@ def keep_house(core: Core) -> None:
     core.count("identity_stale", len(stale))
     strip_identity(core, stale)
     _merge_doubles(core)
+    join_parts(core)
     _end_parts(core)
 
 
@@ -55,7 +57,7 @@ def _merge_doubles(core: Core) -> None:
     for junior in ripe:
         senior = alive[double[junior]]
         if not gone[senior]:
-            _absorb(core, int(senior), int(alive[junior]))
+            absorb(core, int(senior), int(alive[junior]))
             gone[alive[junior]] = True
     core.count("merged", int(gone.sum()))
     end(core, gone)
@@ -80,30 +82,6 @@ def _end_parts(core: Core) -> None:
     gone[young[owner >= 0]] = True
     core.count("absorbed_tracks", int(gone.sum()))
     end(core, gone)
-
-
-def _absorb(core: Core, senior: int, junior: int) -> None:
-    """The senior takes the better state, and name and extent where it has none."""
-    table = core.table
-    if np.trace(table.covariance[junior, :2, :2]) < np.trace(table.covariance[senior, :2, :2]) or (
-        table.radar_time[junior] > table.radar_time[senior]
-    ):
-        for name in ("time", "state", "covariance", "one_point"):
-            getattr(table, name)[senior] = getattr(table, name)[junior]
-        table.looked[:, senior] = table.looked[:, junior]
-    if table.shapes[junior] > table.shapes[senior]:
-        for name in ("length", "width", "heading", "axis", "moving", "shapes", "category"):
-            getattr(table, name)[senior] = getattr(table, name)[junior]
-    if table.address[senior] == "" and table.address[junior] != "":
-        for name in ("address", "callsign", "claimed", "altitude", "on_ground", "simulated", "doubt"):
-            getattr(table, name)[senior] = getattr(table, name)[junior]
-        if table.claimed[senior]:
-            table.category[senior] = table.claimed[senior]
-    for name in ("updated", "radar_time", "node_time", "report_time"):
-        getattr(table, name)[senior] = max(getattr(table, name)[senior], getattr(table, name)[junior])
-    table.hits[senior] += table.hits[junior]
-    table.misses[senior] = min(table.misses[senior], table.misses[junior])
-    table.moved[senior] |= table.moved[junior]
 
 
 @njit(nogil=True, cache=True)

@@ -86,7 +86,7 @@ def _pull(core: Core, row: int, time: float, position: Floats, noise: Floats, si
         # two kinds of sensor agree on a place and a time: that is worth all the looks still wanting
         table.history[row] = 0xFFFFFFFF
         table.looks[row] = max(int(table.looks[row]), 32)
-        table.score[row] = np.inf
+        table.score[row] = core.settings.most_score
         core.count("node_confirmed")
 
 

@@ -128,7 +128,7 @@ def _decide(core: Core, sector: SectorPlots, plots: Plots, plot_rows: Array) -> 
     due = looks.due[near]
     contested = np.zeros(len(plots), np.bool_)
     contested[answer.pair[np.repeat(~due, np.diff(answer.first))]] = True
-    taken = answer.measurement[due]
+    taken = answer.measurement[due].copy()
     used = np.zeros(len(plots), np.bool_)
     used[taken[taken >= 0]] = True
     wait = ~used & (contested | (plot_rows >= sector.closed_to))
@@ -137,6 +137,7 @@ def _decide(core: Core, sector: SectorPlots, plots: Plots, plot_rows: Array) -> 
     core.count("absorbed", int((owner >= 0).sum()))
     owning = np.full(len(left), -1, np.int64)
     owning[owner >= 0] = near[owner[owner >= 0]]
+    _rescue(near[due], taken, left, owning)
     _score(core, sector.radar, near[due], taken, answer.distance[due], covariance[due], plots)
     _hit(core, near[due], taken, plots, position, noise, shape, left, owning)
     _miss(core, near[due][taken < 0], looks)
@@ -147,26 +148,36 @@ def _decide(core: Core, sector: SectorPlots, plots: Plots, plot_rows: Array) -> 
     return wait
 
 
+def _rescue(rows: Array, taken: Array, left: Array, owner: Array) -> None:
+    """Tracks `rows` that took nothing although a plot lies within them take it; `taken` and `owner` are changed."""
+    for k in np.flatnonzero(taken < 0):
+        mine = np.flatnonzero(owner == rows[k])
+        if len(mine):
+            taken[k] = left[mine[0]]
+            owner[mine[0]] = -2
+
+
 def _score(
     core: Core, radar: int, rows: Array, taken: Array, squared: Floats, covariance: Floats, plots: Plots
 ) -> None:
     """The tracks `rows` (k,) took the plots `taken` (k,), -1 for none: what that says about whether they are real."""
     table, settings = core.table, core.settings
-    young = np.flatnonzero(table.phase[rows] == TrackPhase.TENTATIVE)
-    if not len(young):
-        return
-    rows, taken = rows[young], taken[young]
     hit = taken >= 0
     table.score[rows[~hit]] += math.log(1.0 - settings.detection)
-    rows, plot, young = rows[hit], taken[hit], young[hit]
-    spread = covariance[young, :2, :2] + plots.covariance[plot]
+    rows, plot = rows[hit], taken[hit]
+    if not len(rows):
+        return
+    spread = covariance[hit, :2, :2] + plots.covariance[plot]
     place = np.stack([plots.east[plot], plots.north[plot]], axis=1)
     paved = np.isin(core.zones.kind(place[:, 0], place[:, 1]), PAVED)
     learnt = core.false_plots[radar].density(place)
     false = np.where(paved, settings.false_on_pavement, np.maximum(learnt, settings.false_elsewhere))
     volume = 2 * math.pi * np.sqrt(spread[:, 0, 0] * spread[:, 1, 1] - spread[:, 0, 1] ** 2)
     cells = np.array(settings.cell_scores)[np.clip(plots.cells[plot], 1, len(settings.cell_scores)) - 1]
-    table.score[rows] += np.log(settings.detection / (volume * false)) - 0.5 * squared[young] + cells
+    # what lies anywhere within an extended track has no distance of its own
+    away = np.where(np.isfinite(squared[hit]), squared[hit], 2.0)
+    gained = np.log(settings.detection / (volume * false)) - 0.5 * away + cells
+    table.score[rows] = np.minimum(table.score[rows] + gained, settings.most_score)
 
 
 def owners(
@@ -200,7 +211,9 @@ def _hit(
     if len(extra):
         position, shape = _joined(core, rows, taken, plots, position, shape, left[extra], owner[extra])
     table = core.table
-    take(core, rows, plots.time[taken], position, noise[taken], Source.RADAR)
+    # which parts are seen is chance: their centre strays from that of the whole
+    loose = noise[taken] + ((0.5 * table.body[rows]) ** 2)[:, None, None] * np.eye(2)
+    take(core, rows, plots.time[taken], position, loose, Source.RADAR)
     reshape(
         core.settings.shape, rows, table.state, table.covariance, table.moved, shape, plots.bearing_sd[taken],
         table.length, table.width, table.heading, table.axis, table.moving, table.shapes,

@@ -46,6 +46,8 @@ _COLUMNS: dict[str, tuple[str, tuple[int, ...], Any]] = {
     "report_time": ("f8", (), NEVER),
     "simulated": ("?", (), False),
     "twin": ("i4", (), 0),
+    "part": ("i4", (), 0),
+    "body": ("f8", (), 0.0),
     "radar": ("i2", (), -1),
 }
 
@@ -55,10 +57,11 @@ class TrackTable:
 
     looked: (radars, capacity) int64, absolute row of each radar's last look at the track.
     one_point: the velocity is not known yet. birthplace: where it was first seen. history: hits by look, newest in
-    bit 0. score: logarithm of how much better a target explains its plots than false plots do, kept until it is
-    confirmed. axis: rad modulo pi, long axis as the radar sees it. shapes: extents seen. claimed: TargetCategory of
-    its reports. doubt: reports in a row that did not fit. twin: checks in a row that found it to double another.
-    radar: index of the radar whose plot began it, -1 for another sensor.
+    bit 0. score: logarithm of how much better a target explains its plots than false plots do. axis: rad modulo pi,
+    long axis as the radar sees it. shapes: extents seen. claimed: TargetCategory of its reports. doubt: reports in a
+    row that did not fit. twin: checks in a row that found it to double another. part: checks in a row that found it to
+    be a part of another. body: m, half the size of a target that was seen in parts, 0 for others. radar: index of the
+    radar whose plot began it, -1 for another sensor.
     The other columns are those of `Tracks`.
     """
 
@@ -96,6 +99,8 @@ class TrackTable:
     report_time: Array
     simulated: Array
     twin: Array
+    part: Array
+    body: Array
     radar: Array
 
     def __init__(self, capacity: int, radars: int) -> None:

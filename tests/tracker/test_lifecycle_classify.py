@@ -51,8 +51,11 @@ class TestScoreContract(LifecycleContract):
     def test_the_score_decides(self, score: float, history: int, looks: int, phase: TrackPhase, ended: bool) -> None:
         assert self.judge(score=score, history=history, looks=looks) == (phase, ended)
 
-    def test_what_is_confirmed_needs_no_score(self) -> None:
-        assert self.judge(score=-9.0, phase=TrackPhase.CONFIRMED) == (TrackPhase.CONFIRMED, False)
+    def test_what_is_confirmed_needs_less(self) -> None:
+        confirmed = {"phase": TrackPhase.CONFIRMED, "looks": 40}
+        assert self.judge(**confirmed, score=1.0) == (TrackPhase.CONFIRMED, False)
+        assert self.judge(**confirmed, score=-1.0)[1]
+        assert not self.judge(**confirmed, score=-1.0, identified=True)[1]
 
 
 class TestExtentSpeedContract(ClassifyContract):
