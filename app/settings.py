@@ -162,6 +162,10 @@ class DemoSettings(Section):
     first_incident_s: float = Field(45.0, ge=0)
     seed: int = 1
     rain: bool = False
+    synthetic_targets: int = Field(
+        0, ge=0, le=1000, description="so many made-up movers in place of the recorded traffic"
+    )
+    reports: bool = Field(True, description="play the target reports (ADS-B) too; without them all rests on the radar")
     udp_port: int = Field(8600, ge=0, le=65535, description="where the simulated radar sends its datagrams")
 
 

@@ -98,6 +98,7 @@ class DemoFeed:
         host: str = "127.0.0.1",
         seed: int = 1,
         rain: bool = False,
+        reports: bool = True,
         speed: float = 1.0,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -107,7 +108,7 @@ class DemoFeed:
         self._rain = rain
         self._seed = seed
         self._nodes = NodeSimulator(service.nodes, seed)
-        self._reports = ReportSimulator(seed)
+        self._reports = ReportSimulator(seed) if reports else None
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
         self._counters = dict.fromkeys(
@@ -179,9 +180,9 @@ class DemoFeed:
             self._waiting_events = NodeEvents.concatenate(
                 [self._waiting_events, self._nodes.events(since, until, self.world.truth)]
             )
-            self._waiting_reports = TargetReports.concatenate(
-                [self._waiting_reports, self._reports.reports(since, until, self.world.truth)]
-            )
+            if self._reports is not None:
+                made = self._reports.reports(since, until, self.world.truth)
+                self._waiting_reports = TargetReports.concatenate([self._waiting_reports, made])
             self._made_until = until
         ready = self._waiting_events.time <= now
         if ready.any():
@@ -208,7 +209,8 @@ def demo_feed(service: Taker, settings: Settings) -> DemoFeed:
     listening = getattr(service, "video_port", None)
     if listening is not None:
         port = listening(radar.id)
-    return DemoFeed(service, world, port=port, seed=settings.demo.seed, rain=settings.demo.rain)
+    demo = settings.demo
+    return DemoFeed(service, world, port=port, seed=demo.seed, rain=demo.rain, reports=demo.reports)
 
 
 def warm() -> None:

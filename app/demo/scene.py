@@ -13,6 +13,7 @@ from app.settings import NodeSettings, RadarSettings, RunwaySettings, Settings, 
 from pipeline.airport.model import Airport
 from pipeline.simulate.nodes import node_sites
 from pipeline.simulate.recording import Recording, RecordingError
+from pipeline.simulate.scenes import synthetic_world
 from pipeline.simulate.world import World, build_world
 
 PLACES = {"LFPO": (-100.0, -500.0, 40.0)}
@@ -34,6 +35,8 @@ def _scene(airport: str, traffic: str) -> tuple[Airport, Recording]:
 def demo_world(settings: Settings, start: float) -> World:
     """What is true from `start` (UTC s) on. Raises SettingsError."""
     airport, recording = _scene(settings.airport, settings.demo.traffic)
+    if settings.demo.synthetic_targets:
+        return synthetic_world(airport, settings.demo.synthetic_targets, settings.demo.seed, start=start)
     return build_world(
         airport,
         recording,
