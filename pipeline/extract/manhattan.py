@@ -43,7 +43,7 @@ class Manhattan:
     ring_m: tuple[float, ...] = (0.0, 150.0, 300.0, 800.0, 1500.0)
     reach: tuple[int, ...] = (6, 4, 3, 2, 1)
     min_cells: int = 1
-    max_extent_turn: float = 0.125
+    max_extent_turn: float = 0.05
     max_open_runs: int = 32_768
 
     def __post_init__(self) -> None:
