@@ -11,7 +11,8 @@ from pipeline.tables import VideoFormat
 class RadarSite:
     """A radar: local metres, antenna height above the ground, the grid of its video.
 
-    north_offset: rad added to the radar's own azimuth to get true azimuth. simulated: its video is made by a simulator.
+    north_offset: rad added to the radar's own azimuth to get true azimuth; the assembler does it, sweeps are true.
+    simulated: its video is made by a simulator.
     """
 
     id: str

@@ -42,7 +42,7 @@ def surface_raster(
 def surface_of_radar(airport: Airport, site: RadarSite) -> NDArray[np.uint8]:
     """SurfaceKind of each cell of a radar's video, (azimuths, ranges), at the centre of the cell.
 
-    Row 0 is the sweep whose centre is half an azimuth step from north, as the radar counts; the north offset is added.
+    Rows count from true north (the assembler has added the radar's north offset): row 0 is centred half a step from it.
     """
     video = site.video
     ranges = video.first_range_m + np.arange(video.ranges) * video.range_step_m
@@ -51,7 +51,7 @@ def surface_of_radar(airport: Airport, site: RadarSite) -> NDArray[np.uint8]:
     side = int(np.ceil(2 * reach / step))
     grid = Grid(site.east - reach, site.north - reach, step, (side, side))
     raster = surface_raster(airport, grid.east_min, grid.north_min, step, grid.shape)
-    azimuth = (np.arange(video.azimuths) + 0.5) * video.azimuth_step_rad + site.north_offset
+    azimuth = (np.arange(video.azimuths) + 0.5) * video.azimuth_step_rad
     east = site.east + np.sin(azimuth)[:, None] * ranges
     north = site.north + np.cos(azimuth)[:, None] * ranges
     row, column, _ = grid.cells(east, north)
