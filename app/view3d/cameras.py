@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import radians
+from math import radians, tan
 
 import numpy as np
 
 from app.view3d.ground import Ground
 
-NEAR_M, FAR_M = 2.0, 30_000.0
+NEAR_M, FAR_M = 2.0, 40_000.0
 WIDE = radians(50.0)
+TOWER = radians(58.0)
+STEEP = radians(52.0)
+ASPECT = 1.6
+"""Width to height of the screens for which the overview is made."""
 
 Triple = tuple[float, float, float]
 
@@ -25,26 +29,33 @@ class Pose:
 
 
 def overview(ground: Ground) -> Pose:
-    """The whole field from the south, north ahead."""
+    """All runways from the south, north ahead, as near as they still fit on the screen."""
     east, north = ground.centre
-    return Pose((east, north - 0.62 * ground.span, 0.50 * ground.span), (east, north - 0.06 * ground.span, 0.0))
+    back, up = np.cos(STEEP), np.sin(STEEP)
+    relative = ground.corners - np.array(ground.centre) if len(ground.corners) else np.array([[ground.span / 2, 0.0]])
+    across, ahead = relative[:, 0], relative[:, 1] * back
+    high = relative[:, 1] * up
+    # At a distance d a point appears at across / (d + ahead) and high / (d + ahead) of the focal length.
+    fit = tan(WIDE / 2) * 0.94
+    distance = float(max(np.max(np.abs(across) / (fit * ASPECT) - ahead), np.max(np.abs(high) / fit - ahead), 400.0))
+    return Pose((east, north - distance * float(back), distance * float(up)), (east, north, 0.0))
 
 
 def tower(ground: Ground) -> Pose:
-    """From the cab towards the middle of the field; without a tower from a hill at its edge."""
-    east, north = ground.centre
-    eye = ground.tower or (east, north - 0.2 * ground.span, 60.0)
-    ahead = np.array([east - eye[0], north - eye[1]])
-    distance = float(np.hypot(*ahead)) or 1.0
-    out = ahead / distance if distance > 50.0 else np.array([0.0, 1.0])
+    """From above the cab towards the nearest runway; without a tower from a hill at the edge of the field."""
+    eye = ground.tower or (ground.centre[0], ground.centre[1] - 0.2 * ground.span, 60.0)
+    aim = np.array([ground.watched[0] - eye[0], ground.watched[1] - eye[1]])
+    distance = float(np.hypot(aim[0], aim[1]))
+    out = aim / distance if distance > 50.0 else np.array([0.0, 1.0])
     position = (eye[0] + 12.0 * float(out[0]), eye[1] + 12.0 * float(out[1]), eye[2])
-    return Pose(position, (eye[0] + 900.0 * float(out[0]), eye[1] + 900.0 * float(out[1]), 0.0))
+    reach = max(distance, 300.0)
+    return Pose(position, (eye[0] + reach * float(out[0]), eye[1] + reach * float(out[1]), 0.0), TOWER)
 
 
 def chase(east: float, north: float, height: float, heading: float, size: float) -> Pose:
     """From behind and above a target."""
-    back = max(6.0 * size, 90.0)
+    back = max(5.0 * size, 90.0)
     return Pose(
-        (east - back * float(np.sin(heading)), north - back * float(np.cos(heading)), height + 0.55 * back),
+        (east - back * float(np.sin(heading)), north - back * float(np.cos(heading)), height + 0.5 * back),
         (east, north, height + 3.0),
     )

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry import MultiPolygon, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from app.view3d.paint import runway_paint
@@ -23,28 +23,30 @@ Colour = tuple[int, int, int]
 Floats = NDArray[np.float32]
 Faces = NDArray[np.uint32]
 
-GRASS: Colour = (17, 25, 24)
-APRON: Colour = (40, 47, 55)
-STAND: Colour = (47, 55, 64)
-TAXIWAY: Colour = (56, 64, 73)
-RUNWAY: Colour = (82, 89, 98)
+GRASS: Colour = (30, 40, 37)
+APRON: Colour = (52, 60, 70)
+STAND: Colour = (60, 69, 80)
+TAXIWAY: Colour = (68, 77, 88)
+RUNWAY: Colour = (92, 100, 110)
 STOPWAY: Colour = (66, 66, 62)
 PAINT: Colour = (225, 229, 232)
-WALL: Colour = (70, 82, 97)
-ROOF: Colour = (96, 110, 127)
+WALL: Colour = (74, 86, 102)
+ROOF: Colour = (90, 104, 122)
 TOWER: Colour = (150, 166, 184)
-TAXI_LINE: Colour = (146, 126, 52)
-STAND_LINE: Colour = (100, 90, 58)
-HOLD_BAR: Colour = (255, 92, 70)
-INTERSECTION_BAR: Colour = (190, 160, 70)
+TAXI_LINE: Colour = (178, 156, 82)
+STAND_LINE: Colour = (126, 116, 88)
+HOLD_BAR: Colour = (255, 96, 70)
+INTERSECTION_BAR: Colour = (214, 186, 100)
 
-FAR_M = 14_000.0
-"""Half the side of the grass plane."""
+FAR_M = 15_900.0
+"""Half the side of the grass plane; its corners lie behind the sky."""
 
 BELOW_M = -0.8
 """The grass lies this far under the pavements, which hides the seams."""
 
 DEFAULT_HEIGHT_M = 10.0
+EYE_OVER_CAB_M = 24.0
+"""The camera hovers over the cab: from the true height the roofs around hide half of the field."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +74,8 @@ class Lines:
 class Ground:
     """All that does not move. notes: texts with the points they belong to. centre, span: m, of all runways.
 
-    tower: where the eye of the controller is, None when the map has no tower.
+    corners: of all runways, (n, 2) m. tower: the eye of the controller, None when the map has no tower; watched: what
+    the eye is on, the nearest point of the nearest runway.
     """
 
     surfaces: tuple[Surface, ...]
@@ -81,6 +84,8 @@ class Ground:
     centre: tuple[float, float]
     span: float
     tower: tuple[float, float, float] | None
+    watched: tuple[float, float]
+    corners: NDArray[np.float64]
 
 
 def build_ground(airport: Airport) -> Ground:
@@ -114,7 +119,9 @@ def build_ground(airport: Airport) -> Ground:
         ),
         centre=((west + east) / 2, (south + north) / 2),
         span=max(east - west, north - south, 400.0),
-        tower=None if eye is None else (eye[0], eye[1], eye[2] + 6.0),
+        tower=None if eye is None else (eye[0], eye[1], eye[2] + EYE_OVER_CAB_M),
+        watched=_watched(airport, eye) or ((west + east) / 2, (south + north) / 2),
+        corners=shapely.get_coordinates([one.strip for one in airport.runways]).reshape(-1, 2),
     )
 
 
@@ -212,6 +219,15 @@ def _tower(airport: Airport) -> tuple[float, float, float] | None:
         if one.properties.get("use") == "tower" and not one.geometry.is_empty
     ]
     return max(towers, key=lambda one: one[2]) if towers else None
+
+
+def _watched(airport: Airport, eye: tuple[float, float, float] | None) -> tuple[float, float] | None:
+    if eye is None or not airport.runways:
+        return None
+    here = Point(eye[0], eye[1])
+    line = min((one.centreline for one in airport.runways), key=here.distance)
+    near = line.interpolate(line.project(here))
+    return near.x, near.y
 
 
 def _tower_body(eye: tuple[float, float, float]) -> Surface:

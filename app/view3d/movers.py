@@ -23,13 +23,16 @@ VECTOR_S = 10.0
 SLOW_MPS = 1.5
 """Below this a vector is not drawn and the course is not taken for a heading."""
 
-COLOURS = np.array([[196, 203, 212], [96, 190, 255], [150, 230, 110]], np.uint8)
+COLOURS = np.array([[186, 192, 204], [52, 158, 255], [112, 222, 58]], np.uint8)
 """By TargetClass: unknown, aircraft, vehicle."""
 
 COASTING = np.array([128, 132, 138], np.uint8)
-INFORMATION = (255, 178, 30)
-ALARM = (255, 52, 52)
-SHAPES = ("unknown", "aircraft", "vehicle")
+INFORMATION = (255, 168, 0)
+ALARM = (255, 26, 26)
+SHAPES = ("unknown", "aircraft", "vehicle", "round")
+"""By TargetClass, and one for aircraft whose nose is not known."""
+
+ROUND = 3
 
 # Length, width (m) where not known, and the limits within which the shape stays itself; by TargetClass.
 USUAL = np.array([[8.0, 8.0], [37.0, 35.0], [8.0, 3.5]])
@@ -111,11 +114,11 @@ class Movers:
         height = np.where(np.isfinite(tracks.altitude) & ~tracks.on_ground, np.maximum(tracks.altitude, 0.0), 0.0)
         position: NDArray[np.float64] = np.round(np.column_stack([tracks.state[:, :2], height]), 1)
         speed: NDArray[np.float64] = np.hypot(tracks.state[:, 2], tracks.state[:, 3])
-        category = np.minimum(tracks.category.astype(np.int64), len(SHAPES) - 1)
+        category = np.minimum(tracks.category.astype(np.int64), int(max(TargetClass)))
         size = _sizes(tracks, category)
         colour = _colours(tracks, category, stages)
         heading = self._headings(tracks, place, speed)
-        shape = np.where(np.isnan(heading) & (category == TargetClass.AIRCRAFT), int(TargetClass.UNKNOWN), category)
+        shape = np.where(np.isnan(heading) & (category == TargetClass.AIRCRAFT), ROUND, category)
         coasting = tracks.phase == TrackPhase.COASTING
         wxyz = _turned(np.nan_to_num(heading))
         bodies = {}
@@ -126,7 +129,7 @@ class Movers:
             bodies[name] = _instances(
                 CAPACITY, place[one], position[one], wxyz[one], scale[one], colour[one], opacity[one]
             )
-        radius = np.maximum(size.max(axis=1, initial=0.0) * 0.62, 9.0)
+        radius = np.maximum(size.max(axis=1, initial=0.0) * 0.75, 14.0)
         flat = np.column_stack([radius, radius, np.ones(len(radius))])
         lifted = position + np.array([0, 0, 0.3])
         marks = _instances(

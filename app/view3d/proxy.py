@@ -102,6 +102,8 @@ def router(view: View, settings: Settings) -> APIRouter:
             return Response(packed, media_type="text/html", headers={**headers, "Content-Encoding": "gzip"})
         return Response(content, media_type="text/html", headers=headers)
 
+    # viser's page leaves the last slash of its own address away.
+    @made.websocket("/3d")
     @made.websocket("/3d/")
     async def through(websocket: WebSocket) -> None:
         headers = websocket.headers
@@ -245,7 +247,8 @@ def _page(mode: str) -> tuple[bytes, bytes, str, str]:
 
 def _banner(mode: str) -> str:
     look = (
-        "position:fixed;left:12px;top:10px;z-index:5;font:600 13px system-ui,sans-serif;color:#eaf1f6;"
+        "position:fixed;left:50%;transform:translateX(-50%);top:10px;z-index:5;white-space:nowrap;"
+        "font:600 13px system-ui,sans-serif;color:#eaf1f6;"
         "display:flex;gap:8px;align-items:center"
     )
     link = (

@@ -11,9 +11,16 @@ from app.view3d import shapes
 from app.view3d.ground import Ground
 from app.view3d.movers import ALERT_LINES, CAPACITY, RINGS, Frame, Instances, Strokes
 
-SKY = (13, 18, 25)
-AMBIENT = 1.5
-SUN = 2.1
+SKY = (20, 29, 41)
+SKY_M = 16_000.0
+AMBIENT = 3.0
+SUN = 1.6
+
+
+LINEAR = np.round(
+    255 * np.where(np.arange(256) <= 10, np.arange(256) / 255 / 12.92, ((np.arange(256) / 255 + 0.055) / 1.055) ** 2.4)
+).astype(np.uint8)
+"""viser takes the colours of instances and lines as linear light, every other colour as sRGB (IEC 61966-2-1)."""
 
 
 class Scene:
@@ -27,6 +34,7 @@ class Scene:
             name: _batch(server.scene, f"/targets/{name}", shape, CAPACITY)
             for name, shape in (
                 ("unknown", shapes.unknown()),
+                ("round", shapes.puck()),
                 ("aircraft", shapes.aircraft()),
                 ("vehicle", shapes.vehicle()),
             )
@@ -63,7 +71,10 @@ def _light(scene: Any) -> None:
     scene.add_light_directional(
         "/light/sun", color=(255, 246, 230), intensity=SUN, position=(-3000.0, -5000.0, 6500.0), cast_shadow=False
     )
-    scene.configure_fog(6_000.0, 13_500.0, color=SKY)
+    # No fog: with it the outline of a hovered instance stops the client (1.1.1) from drawing what is translucent.
+    scene.add_icosphere(
+        "/sky", radius=SKY_M, color=SKY, subdivisions=2, side="back", cast_shadow=False, receive_shadow=False
+    )
 
 
 def _build(scene: Any, ground: Ground) -> None:
@@ -74,7 +85,7 @@ def _build(scene: Any, ground: Ground) -> None:
         )  # fmt: skip
     for line in ground.lines:
         scene.add_line_segments(
-            line.name, line.points, np.array(line.colour, np.uint8), thickness=line.width, thickness_units="screen"
+            line.name, line.points, LINEAR[np.array(line.colour)], thickness=line.width, thickness_units="screen"
         )
     for text, position in ground.notes:
         scene.add_label(f"/notes/{text}", text, position=position, font_screen_scale=1.0, anchor="bottom-center")
@@ -103,10 +114,10 @@ def _fill(handle: Any, one: Instances) -> None:
     handle.batched_positions = one.positions
     handle.batched_wxyzs = one.wxyzs
     handle.batched_scales = one.scales
-    handle.batched_colors = one.colours
+    handle.batched_colors = LINEAR[one.colours]
     handle.batched_opacities = one.opacities
 
 
 def _draw(handle: Any, one: Strokes) -> None:
     handle.points = one.points
-    handle.colors = one.colours
+    handle.colors = LINEAR[one.colours]

@@ -58,6 +58,18 @@ def unknown() -> Shape:
     return _joined([(vertices, np.array(faces))])
 
 
+def puck(sides: int = 16) -> Shape:
+    """A low drum of diameter and height 1, for what is known but not which way it points."""
+    angle = np.linspace(0, 2 * np.pi, sides, endpoint=False)
+    circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(sides)])
+    points = np.vstack([circle * 0.5, circle * 0.44 + np.array([0, 0, 0.7]), [[0, 0, 1.0]]])
+    k = np.arange(sides)
+    after = (k + 1) % sides
+    walls = np.vstack([np.column_stack([k, after, after + sides]), np.column_stack([k, after + sides, k + sides])])
+    top = np.column_stack([k + sides, after + sides, np.full(sides, 2 * sides)])
+    return _joined([(points, np.vstack([walls, top]))])
+
+
 def ring(inner: float = 0.86, sides: int = 40) -> Shape:
     """A flat ring of radius 1."""
     return _joined([_annulus(inner, 1.0, sides)])

@@ -16,7 +16,7 @@ from app.view3d.movers import Frame, Target
 from app.view3d.slots import Slots
 from pipeline.airport.model import Airport
 
-LABEL_SCALE = 0.95
+LABEL_SCALE = 0.9
 
 
 class Viewer:
@@ -34,7 +34,7 @@ class Viewer:
         self._places = Slots(labels.MOST)
         self._labels: dict[int, Any] = {}
         self._text = ""
-        # Controllers look from the ground; a camera further out than this sees nothing but fog.
+        # Controllers look from the ground; a camera further out than this sees nothing.
         client.camera.max_orbit_distance = 12_000.0
         gui = client.gui
         self._views = gui.add_button_group("Camera", ("Tower", "Overview", "Follow"))
