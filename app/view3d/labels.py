@@ -9,7 +9,7 @@ from math import hypot, tan
 import numpy as np
 from numpy.typing import NDArray
 
-from app.view3d.movers import Target
+from app.view3d.movers import MAST_M, Target
 
 MOST = 40
 MOVING_MPS = 1.5
@@ -47,12 +47,8 @@ def label_text(target: Target) -> str:
 
 
 def label_height(target: Target) -> float:
-    """Height (m) of a label's foot over the ground."""
-    return target.height + (MAST if target.stage else max(6.0, 0.42 * target.size))
-
-
-MAST = 96.0
-"""A label of an alerted target stands on its mast."""
+    """Height (m) of a label's foot over the ground; that of an alerted target stands on its mast."""
+    return target.height + (MAST_M + 6.0 if target.stage else max(6.0, 0.42 * target.size))
 
 
 def choose(targets: Iterable[Target], selected: Collection[int], eye: Eye | None) -> list[Target]:

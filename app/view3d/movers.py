@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,11 @@ from pipeline.tables import TargetClass, TrackPhase, Tracks
 CAPACITY = 1024
 RINGS = 64
 ALERT_LINES = 256
-MAST_M = 90.0
+MAST_M = 150.0
 """Height of the line that stands over an alerted target."""
+
+RING_M = 70.0
+"""Least radius of the ring around an alerted target: it must be found from far away."""
 
 VECTOR_S = 10.0
 """A speed vector ends where the target would be after this time."""
@@ -159,14 +163,25 @@ class Movers:
         """Links between the targets of an alert, a mast over each of them, and the outline of its runway."""
         points: list[Floats] = []
         colours: list[tuple[int, int, int]] = []
+        drawn: set[object] = set()
         for alert in sorted(alerts, key=lambda one: one.stage != "alarm"):
             colour = ALARM if alert.stage == "alarm" else INFORMATION
             feet = [targets[one.track] for one in alert.targets if one.track in targets]
-            ends = np.array([(one.east, one.north, one.height + 6.0) for one in feet], np.float32).reshape(-1, 3)
-            made = [np.stack([ends[:-1], ends[1:]], axis=1), np.stack([ends, ends + np.array([0, 0, MAST_M])], axis=1)]
-            made.append(self._outlines.get(alert.runway or "", np.zeros((0, 2, 3), np.float32)))
-            points += [one.astype(np.float32) for one in made]
-            colours += [colour] * sum(len(one) for one in made)
+            made: dict[object, Floats] = {}
+            for one in feet:
+                foot = np.array([one.east, one.north, one.height + 6.0], np.float32)
+                made[one.id] = np.array([[foot, foot + np.array([0, 0, MAST_M])]], np.float32)
+            for a, b in pairwise(feet):
+                link = [[(one.east, one.north, one.height + 6.0) for one in (a, b)]]
+                made[frozenset((a.id, b.id))] = np.array(link, np.float32)
+            if alert.runway in self._outlines:
+                made[alert.runway] = self._outlines[alert.runway]
+            for what, segments in made.items():
+                # The gravest alert comes first and nothing is drawn over it.
+                if what not in drawn:
+                    drawn.add(what)
+                    points.append(segments)
+                    colours += [colour] * len(segments)
         return _strokes(ALERT_LINES, np.concatenate([np.zeros((0, 2, 3), np.float32), *points]), colours)
 
 
@@ -274,7 +289,7 @@ def _rings(targets: dict[int, Target]) -> dict[str, Instances]:
     made = {}
     for stage, colour in (("information", INFORMATION), ("alarm", ALARM)):
         hit = [one for one in targets.values() if one.stage == stage][:RINGS]
-        radius = np.array([max(one.size * 1.1, 42.0) for one in hit])
+        radius = np.array([max(one.size * 1.3, RING_M) for one in hit])
         position = np.array([(one.east, one.north, one.height + 0.9) for one in hit]).reshape(-1, 3)
         made[stage] = _instances(
             RINGS, np.arange(len(hit)), position, _turned(np.full(len(hit), np.pi / 2)),

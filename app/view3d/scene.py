@@ -11,7 +11,7 @@ from app.view3d import shapes
 from app.view3d.ground import Ground
 from app.view3d.movers import ALERT_LINES, CAPACITY, RINGS, Frame, Instances, Strokes
 
-SKY = (20, 29, 41)
+SKY = (58, 78, 102)
 SKY_M = 16_000.0
 AMBIENT = 3.0
 SUN = 1.6
@@ -20,7 +20,7 @@ SUN = 1.6
 LINEAR = np.round(
     255 * np.where(np.arange(256) <= 10, np.arange(256) / 255 / 12.92, ((np.arange(256) / 255 + 0.055) / 1.055) ** 2.4)
 ).astype(np.uint8)
-"""viser takes the colours of instances and lines as linear light, every other colour as sRGB (IEC 61966-2-1)."""
+"""viser takes colours that come one for each instance or point as linear light, all others as sRGB (IEC 61966-2-1)."""
 
 
 class Scene:
@@ -85,7 +85,7 @@ def _build(scene: Any, ground: Ground) -> None:
         )  # fmt: skip
     for line in ground.lines:
         scene.add_line_segments(
-            line.name, line.points, LINEAR[np.array(line.colour)], thickness=line.width, thickness_units="screen"
+            line.name, line.points, np.array(line.colour, np.uint8), thickness=line.width, thickness_units="screen"
         )
     for text, position in ground.notes:
         scene.add_label(f"/notes/{text}", text, position=position, font_screen_scale=1.0, anchor="bottom-center")

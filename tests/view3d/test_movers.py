@@ -127,7 +127,10 @@ def test_the_nose_points_where_the_heading_says(heading: float) -> None:
     assert north == pytest.approx(math.cos(heading), abs=0.01)
 
 
-def test_without_a_heading_the_course_counts_then_the_last_known_and_else_the_shape_has_no_nose() -> None:
+def test_without_a_heading_the_course_counts_then_the_last_known_and_else_the_shape_has_no_nose(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("app.view3d.movers.CAPACITY", 3)
     movers = Movers()
     rolling, standing = np.array([[0, 0, 10.0, 0]]), np.zeros((1, 4))
     unknown = movers.arrange(picture(tracks([1], category=1, state=standing)))
@@ -137,7 +140,7 @@ def test_without_a_heading_the_course_counts_then_the_last_known_and_else_the_sh
         (place,) = shown(frame.bodies["aircraft"])
         assert forward(frame.bodies["aircraft"].wxyzs[place]) == pytest.approx((1.0, 0.0), abs=1e-6)
     movers.arrange(picture(tracks([])))
-    for _ in range(CAPACITY):
+    for _ in range(2):
         movers.arrange(picture(tracks([2])))
         movers.arrange(picture(tracks([])))
     again = movers.arrange(picture(tracks([3], category=1, state=standing)))
@@ -193,9 +196,16 @@ def test_an_alert_links_its_targets_raises_masts_and_outlines_its_runway() -> No
     drawn = np.flatnonzero(frame.alert_lines.colours.any(axis=(1, 2)))
     points = frame.alert_lines.points[drawn]
     assert len(points) == 1 + 2 + 3
-    assert points[0, :, 0].tolist() == [0.0, 100.0]
-    assert (points[1:3, 1, 2] - points[1:3, 0, 2]).tolist() == [MAST_M, MAST_M]
+    assert (points[:2, 1, 2] - points[:2, 0, 2]).tolist() == [MAST_M, MAST_M]
+    assert points[2, :, 0].tolist() == [0.0, 100.0]
     assert np.array_equal(points[3:], edge)
+
+
+def test_what_two_alerts_share_is_drawn_once_in_the_colour_of_the_graver() -> None:
+    frame = arranged(alert([1, 2], "information"), alert([1, 2], "alarm", id=2))
+    drawn = np.flatnonzero(frame.alert_lines.colours.any(axis=(1, 2)))
+    assert len(drawn) == 3
+    assert {tuple(one) for one in frame.alert_lines.colours[drawn, 0]} == {ALARM}
 
 
 def test_an_alert_about_targets_that_are_gone_is_no_fault() -> None:
