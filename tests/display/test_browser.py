@@ -216,7 +216,12 @@ def test_the_picture_says_what_it_is(screen: Screen) -> None:
     assert "DEMO" in text(screen, "#mode")
     assert "OpenStreetMap" in text(screen, "#credit")
     assert re.fullmatch(r"\d\d:\d\d:\d\d", text(screen, "#data-clock"))
-    assert "silent" in text(screen, "#sensor-list")
+    screen.until("document.querySelector('#sensor-list').innerText.includes('silent')")
+    name = screen.page.locator("button.sensor-name").first
+    assert screen.page.locator(".sensor-all").first.is_hidden()
+    name.click()
+    assert screen.page.locator(".sensor-all").first.is_visible()
+    assert name.get_attribute("aria-expanded") == "true"
     assert text(screen, "#sound") == "sound off"
     screen.page.locator("#sound").click()
     assert text(screen, "#sound") == "sound on"

@@ -2,6 +2,7 @@
 
 import { classOf, isAirborne, isCoasting, isStanding, labelText } from '../model/label_text.js';
 import { isNumber } from '../model/format.js';
+import { coastedS } from '../model/motion.js';
 import { placeLabels } from '../model/placement.js';
 import { onScreen, radiusOf } from './targets.js';
 
@@ -77,9 +78,7 @@ export class LabelLayer {
       const label = target.label;
       label.visible = false;
       if (level === 'off') continue;
-      const since = target.coastingSince;
-      const age = isNumber(since) ? Math.max(0, picture.time - since) : 0;
-      label.text = labelText(target.track, level, age);
+      label.text = labelText(target.track, level, coastedS(target, picture.time));
       [label.w, label.h] = this.size(context, label.text);
       requests.push({
         id: target.track.id, x: target.x, y: target.y, radius: radiusOf(target, view.scale),
@@ -152,7 +151,7 @@ export class LabelLayer {
       context.setLineDash(dashed ? [3, 3] : []);
       context.beginPath();
       for (const target of targets) {
-        if (isCoasting(target.track) !== dashed) continue;
+        if (isCoasting(target.track, coastedS(target, scene.picture.time)) !== dashed) continue;
         const { sx, sy, w, h } = target.label;
         const px = Math.min(Math.max(0, sx), sx + w);
         const py = Math.min(Math.max(0, sy), sy + h);

@@ -1,7 +1,7 @@
 // Symbols, vectors, history and alert rings of every target.
 
 import { classOf, isCoasting, isStanding } from '../model/label_text.js';
-import { headingAt, positionAt } from '../model/motion.js';
+import { coastedS, headingAt, positionAt } from '../model/motion.js';
 import { FAREWELL_MS } from '../feed/picture.js';
 import { drawSymbol, extentOf, symbolRadius } from './symbols.js';
 
@@ -75,7 +75,7 @@ function drawOne(context, scene, target, nowMs) {
   const kind = classOf(track);
   const [length, width] = extentOf(kind, track.length_m, track.width_m);
   const heading = headingAt(target, nowMs);
-  const hollow = isCoasting(track) || track.phase === 'tentative';
+  const hollow = isCoasting(track, coastedS(target, scene.picture.time)) || track.phase === 'tentative';
   const ink = inkOf(scene, target);
   if (hollow) context.globalAlpha *= 0.85;
   drawSymbol(context, target.x, target.y, view.scale, view.rotation, { kind, heading, length, width, hollow, ink, halo: theme.ink.halo });
@@ -158,7 +158,8 @@ function drawVectors(context, scene, shown) {
     context.setLineDash(dashed ? [4, 4] : []);
     context.beginPath();
     for (const target of shown) {
-      if (isCoasting(target.track) !== dashed || isStanding(target.track) || Math.hypot(target.ve, target.vn) < 1) continue;
+      const coasting = isCoasting(target.track, coastedS(target, scene.picture.time));
+      if (coasting !== dashed || isStanding(target.track) || Math.hypot(target.ve, target.vn) < 1) continue;
       const [x, y] = view.toScreen(target.e + target.ve * seconds, target.n + target.vn * seconds);
       context.moveTo(target.x, target.y);
       context.lineTo(x, y);

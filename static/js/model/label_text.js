@@ -8,8 +8,11 @@ import { STANDING_MPS } from './motion.js';
 /** @param {Track} track @returns {string} the name a controller calls it by: callsign, else the track number */
 export const nameOf = (track) => (track.callsign && track.callsign.trim()) || `#${track.id}`;
 
-/** @param {Track} track @returns {boolean} */
-export const isCoasting = (track) => track.phase === 'coasting';
+/** A target missed for less than this is shown as seen: one turn without an echo is ordinary, s. */
+export const COAST_SHOWN_S = 1.5;
+
+/** @param {Track} track @param {number} coastedS seconds that it has coasted @returns {boolean} to be shown as coasting */
+export const isCoasting = (track, coastedS) => track.phase === 'coasting' && coastedS >= COAST_SHOWN_S;
 
 /** @param {Track} track @returns {boolean} */
 export const isAirborne = (track) => track.on_ground === false;
@@ -28,7 +31,7 @@ export function classOf(track) {
  * @returns {import('../types.js').LabelText}
  */
 export function labelText(track, level, coastedS) {
-  const coasting = isCoasting(track);
+  const coasting = isCoasting(track, coastedS);
   const first = `${nameOf(track)}${track.phase === 'tentative' ? '?' : ''}`;
   const mark = track.simulated ? 'SIM' : '';
   if (level === 'short') return { first, second: coasting ? `C${Math.round(coastedS)}` : '', mark: '' };

@@ -55,6 +55,12 @@ export function newTarget(track, pictureTime, nowMs) {
   };
 }
 
+/** @param {Target} target @param {number} pictureTime UTC s @returns {number} seconds that it has coasted, 0 when it does not */
+export function coastedS(target, pictureTime) {
+  const since = pictureTime - target.coastingSince;
+  return finite(since) ? Math.max(0, since) : 0;
+}
+
 /** @param {Track} track @param {number} pictureTime @returns {number} */
 function age(track, pictureTime) {
   const value = pictureTime - track.time;

@@ -2,6 +2,7 @@
 
 import { knots, number } from '../model/format.js';
 import { classOf, isCoasting, isStanding, nameOf, placeOf } from '../model/label_text.js';
+import { coastedS } from '../model/motion.js';
 import { byId, el, keyed, setText } from './dom.js';
 
 /** @typedef {import('../types.js').Track} Track */
@@ -71,12 +72,14 @@ export class TargetList {
   fill(element, track, selected) {
     const part = (/** @type {string} */ name) => /** @type {HTMLElement} */ (element.querySelector(name));
     const kind = classOf(track);
-    element.className = `row is-${kind}${isCoasting(track) ? ' is-coasting' : ''}`;
+    const target = this.picture.targets.get(track.id);
+    const coasting = isCoasting(track, target ? coastedS(target, this.picture.time) : 0);
+    element.className = `row is-${kind}${coasting ? ' is-coasting' : ''}`;
     if (selected !== null) part('button').setAttribute('aria-current', String(track.id === selected));
     part('button').setAttribute('aria-label', `${nameOf(track)}, ${kind}`);
     setText(part('.row-mark'), SHAPES[kind]);
     setText(part('.row-name'), nameOf(track));
     setText(part('.row-place'), placeOf(track));
-    setText(part('.row-speed'), isCoasting(track) ? 'coast' : isStanding(track) ? '–' : number(knots(track.speed_mps), 0, 'kt'));
+    setText(part('.row-speed'), coasting ? 'coast' : isStanding(track) ? '–' : number(knots(track.speed_mps), 0, 'kt'));
   }
 }

@@ -1,24 +1,27 @@
-// Sensor health: status in words and shape, age, rates of loss.
+// Sensor health: status in words and shape, age, what was lost by reason.
 
 import { compact, duration, isNumber } from '../model/format.js';
 import { byId, el, keyed, setText } from './dom.js';
 
 /** @typedef {import('../types.js').SensorState} SensorState */
 
-/** Counters that are no loss. */
-const GOOD = /^(sweeps|taken|datagrams|messages|received|blocks|scans|turns|plots|events|reports|bytes|sent|records)/;
+/** Words in the name of a counter that mean loss or trouble; everything else is how much was done. */
+const TROUBLE = new Set(('lost late duplicate reordered dropped wrong malformed truncated oversized refused failed failures missing degraded '
+  + 'no silent overflow errors incomplete backwards jump step restart sequence compressed undelivered skipped implausible retries held').split(' '));
 const MARKS = { ok: '●', degraded: '◐', silent: '✕', waiting: '○' };
 
-/** @param {SensorState} sensor @returns {[string, number][]} what was dropped, by reason */
-export const drops = (sensor) =>
-  Object.entries(sensor.counters ?? {}).filter(([name, count]) => isNumber(count) && count > 0 && !GOOD.test(name));
+/** @param {SensorState} sensor @returns {[string, number][]} what was lost or went wrong, by reason */
+export const drops = (sensor) => Object.entries(sensor.counters ?? {})
+  .filter(([name, count]) => isNumber(count) && count > 0 && name.split('_').some((word) => TROUBLE.has(word)));
 
-/** One row a sensor; the rest of its counters in the tooltip. */
+/** One row a sensor, with what it lost; a click on its name shows all its counters. */
 export class SensorPanel {
   /** @param {import('../feed/picture.js').PictureState} picture */
   constructor(picture) {
     this.picture = picture;
     this.list = byId('sensor-list');
+    /** @type {Set<string>} those whose counters are all shown */
+    this.open = new Set();
   }
 
   update() {
@@ -26,9 +29,10 @@ export class SensorPanel {
     byId('sensor-none').hidden = sensors.length > 0;
     const poor = sensors.filter((one) => one.status !== 'ok').length;
     setText(byId('sensor-count'), poor ? `${poor} of ${sensors.length} not ok` : sensors.length ? `${sensors.length} ok` : '');
-    keyed(this.list, sensors, (one) => one.id, () => el('li', { class: 'sensor' },
-      el('span', { class: 'sensor-mark', 'aria-hidden': 'true' }), el('span', { class: 'sensor-name' }), el('span', { class: 'sensor-state' }),
-      el('span', { class: 'sensor-age' }), el('span', { class: 'sensor-drops' })), (element, one) => this.fill(element, one));
+    keyed(this.list, sensors, (one) => one.id, (one) => el('li', { class: 'sensor' },
+      el('span', { class: 'sensor-mark', 'aria-hidden': 'true' }), this.nameButton(one.id), el('span', { class: 'sensor-state' }),
+      el('span', { class: 'sensor-age' }), el('span', { class: 'sensor-drops' }), el('dl', { class: 'sensor-all', hidden: true })),
+    (element, one) => this.fill(element, one));
   }
 
   /** @param {HTMLElement} element @param {SensorState} sensor */
@@ -40,10 +44,27 @@ export class SensorPanel {
     setText(part('.sensor-state'), sensor.status);
     const age = isNumber(sensor.last) ? this.picture.time - sensor.last : NaN;
     setText(part('.sensor-age'), isNumber(age) ? (age < 1.5 ? 'now' : duration(age)) : '–');
-    const lost = drops(sensor);
-    const detail = [sensor.detail, ...lost.map(([name, count]) => `${name} ${compact(count)}`)].filter(Boolean).join(' · ');
-    setText(part('.sensor-drops'), detail);
-    part('.sensor-drops').hidden = !detail;
-    element.title = Object.entries(sensor.counters ?? {}).map(([name, count]) => `${name}: ${count}`).join('\n');
+    const said = [sensor.detail, ...drops(sensor).map(([name, count]) => `${words(name)} ${compact(count)}`)].filter(Boolean).join(' · ');
+    setText(part('.sensor-drops'), said);
+    part('.sensor-drops').hidden = !said;
+    const open = this.open.has(sensor.id);
+    part('.sensor-name').setAttribute('aria-expanded', String(open));
+    part('.sensor-all').hidden = !open;
+    const all = Object.entries(sensor.counters ?? {});
+    const rows = open ? all : [];
+    keyed(part('.sensor-all'), rows, ([name]) => name, ([name]) => el('div', {}, el('dt', { text: words(name) }), el('dd')),
+      (row, [, count]) => setText(/** @type {HTMLElement} */ (row.querySelector('dd')), String(count)));
+    if (open && !all.length) setText(part('.sensor-all'), 'it counts nothing');
+  }
+
+  /** @param {string} id @returns {HTMLElement} */
+  nameButton(id) {
+    return el('button', { type: 'button', class: 'sensor-name plain', title: 'All its counters', 'aria-expanded': 'false', onclick: () => {
+      if (!this.open.delete(id)) this.open.add(id);
+      this.update();
+    } });
   }
 }
+
+/** @param {string} name @returns {string} */
+const words = (name) => name.replaceAll('_', ' ');

@@ -4,6 +4,7 @@ import { test, mock } from 'node:test';
 import { LiveFeed } from '../../../static/js/feed/live.js';
 import { onKey } from '../../../static/js/input/keys.js';
 import { matches } from '../../../static/js/panels/list.js';
+import { drops } from '../../../static/js/panels/sensors.js';
 import { healthOf } from '../../../static/js/panels/status.js';
 import { DEFAULTS, Settings, next, sane, viewFromQuery, viewToQuery, VECTORS } from '../../../static/js/settings.js';
 
@@ -159,4 +160,14 @@ test('the list finds targets by any word', () => {
   assert.ok(matches(track, '#12', 'moving'));
   assert.ok(!matches(track, 'afr', 'vehicle'));
   assert.ok(!matches(track, 'baw', ''));
+});
+
+test('of a sensor only what means loss or trouble is shown unasked', () => {
+  const counters = {
+    octets: 7, cells_detected: 5, confirmed: 2, absorbed: 9, plots: 4, sectors_sent: 3, lost: 1, late: 0, wrong_cell_count: 2,
+    queue_dropped_blocks: 3, missing_sweeps: 4, no_time: 5, plots_below_min_cells: 6, node_events: 8, deliver_failed: 1, identified: 2,
+  };
+  const sensor = { id: 'a', kind: 'radar', status: 'ok', last: 0, simulated: false, detail: '', counters };
+  assert.deepEqual(drops(sensor).map(([name]) => name), ['lost', 'wrong_cell_count', 'queue_dropped_blocks', 'missing_sweeps', 'no_time', 'deliver_failed']);
+  assert.deepEqual(drops({ ...sensor, counters: { lost: Number.NaN } }), []);
 });

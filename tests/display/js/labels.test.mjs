@@ -80,6 +80,9 @@ test('label texts: names, null-safe, coasting age, simulated mark', () => {
   assert.deepEqual(full, { first: 'AFR12QK', second: '19 kt  RWY 06/24', mark: 'SIM' });
   const coasting = labelText({ ...bare, phase: 'coasting', speed_mps: 10 }, 'full', 4.2);
   assert.equal(coasting.second, 'COAST 4 s  19 kt');
+  const missedOnce = labelText({ ...bare, phase: 'coasting', speed_mps: 10 }, 'full', 1.4);
+  assert.equal(missedOnce.second, '19 kt');
+  assert.equal(labelText({ ...bare, phase: 'coasting' }, 'short', 0).second, '');
   assert.equal(labelText({ ...bare, phase: 'tentative' }, 'short', 0).first, '#17?');
   assert.equal(labelText({ ...bare, zone: 'way/123456' }, 'full', 0).second, '');
 });
