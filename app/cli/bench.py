@@ -1,4 +1,4 @@
-"""`airside bench`: what each stage costs, as ratios to reading the radar frame once, next to other libraries."""
+"""`airside bench`: what each stage costs, next to other libraries; `airside bench picture`: how good the picture is."""
 
 from __future__ import annotations
 
@@ -9,13 +9,19 @@ import typer
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from pipeline.measure.picture_quality import Score
+
 
 def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command("bench")(bench)
+    """Add the commands."""
+    group = typer.Typer(invoke_without_command=True)
+    group.callback()(bench)
+    group.command("picture")(picture)
+    app.add_typer(group, name="bench")
 
 
 def bench(
+    context: typer.Context,
     repeats: Annotated[int, typer.Option(min=3, help="Turns measured for each line; the median is printed.")] = 60,
     peers: Annotated[bool, typer.Option(help="Also measure numpy, scipy and OpenCV on the same input.")] = True,
 ) -> None:
@@ -24,6 +30,8 @@ def bench(
     One turn is 4096 x 1024 cells of 8 bits, a second of a 60 rpm radar. Read the ratios: milliseconds depend on what
     else the machine does.
     """
+    if context.invoked_subcommand is not None:
+        return
     from rich.console import Console
 
     console = Console()
@@ -31,6 +39,38 @@ def bench(
         table = _front_end(repeats, peers)
     console.print(table)
     # further sections (tracker, datagram to client) print their own tables here
+
+
+def picture(
+    scans: Annotated[int, typer.Option(min=40, help="Turns of the radar to run; the first 30 are not counted.")] = 300,
+) -> None:
+    """Run the demonstration's world through radar chain and tracker and compare the picture with the truth.
+
+    Bounds are those of EUROCAE ED-87 for the manoeuvring area where it has one: targets, not a certificate.
+    """
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from app.bench.picture import demo_quality
+
+    with Progress(transient=True) as progress:
+        task = progress.add_task("Turns of the radar", total=scans)
+        score = demo_quality(scans, lambda scan: progress.update(task, completed=scan + 1))
+    Console().print(_quality(score, scans))
+
+
+def _quality(score: Score, scans: int) -> Table:
+    from rich.table import Table
+
+    table = Table(title=f"Picture against truth, {scans} turns", title_justify="left")
+    for name, side in (("figure", "left"), ("measured", "right"), ("wanted", "right"), ("", "left"), ("", "left")):
+        table.add_column(name, justify="right" if side == "right" else "left", no_wrap=side == "right")
+    for row in score.rows():
+        wanted = "" if row.bound is None else f"{'>=' if row.at_least else '<='} {row.bound:g}"
+        verdict = {True: "met", False: "NOT MET", None: ""}[row.met]
+        style = {True: None, False: "red", None: "dim"}[row.met]
+        table.add_row(row.name, f"{row.value:.4g}", wanted, row.unit, verdict, style=style)
+    return table
 
 
 def _front_end(repeats: int, peers: bool) -> Table:

@@ -199,14 +199,20 @@ def script(
     if not ways:
         return []
     made: list[Incident] = []
+    last = ""
     ends = [(one.runway, one.end) for one in known if one.to_threshold > 0] or [
         (ways[0].hold.runway, next(iter(ways[0].along)))
     ]
     usual = max(sorted(set(ends)), key=ends.count)
     for number in range(max(1, int(length // every))):
         nominal = (first + number * every) % length
-        incident = _recorded(number, nominal, known, movements, ways, length, reach)
-        made.append(incident or _invented(number, nominal, airport, usual, ways, length))
+        # the vehicle before may still stand at its hold: another hold is taken where there is one
+        others = [way for way in ways if way.hold.id != last]
+        incident = _recorded(number, nominal, known, movements, others, length, reach) or _recorded(
+            number, nominal, known, movements, ways, length, reach
+        )
+        made.append(incident or _invented(number, nominal, airport, usual, others or ways, length))
+        last = made[-1].hold
     return made
 
 

@@ -17,9 +17,18 @@ _TYPES = ("A320", "B738", "E190", "A321")
 
 
 def parked(
-    airport: Airport, movements: Sequence[Movement], length: float, count: int, seed: int, clearance: float = 60.0
+    airport: Airport,
+    movements: Sequence[Movement],
+    length: float,
+    count: int,
+    seed: int,
+    clearance: float = 60.0,
+    vehicles: Sequence[Movement] = (),
+    wing_clearance: float = 32.0,
 ) -> list[Movement]:
     """Up to `count` simulated aircraft without transponder on stands that nothing in `movements` comes near.
+
+    clearance: m from the middle of the aircraft to anything in `movements`; wing_clearance: to anything in `vehicles`.
 
     They stand nose in: on a stand's guidance line, with the nose at the end that is nearer to a building.
     """
@@ -30,6 +39,8 @@ def parked(
     rng = np.random.default_rng([seed, 17])
     busy = [np.stack([one.east, one.north], axis=1)[::3] for one in movements]
     tracks = np.concatenate(busy) if busy else np.zeros((0, 2))
+    driven = [np.stack([one.east, one.north], axis=1) for one in vehicles]
+    ways = np.unique(np.round(np.concatenate(driven) / 4.0), axis=0) * 4.0 if driven else np.zeros((0, 2))
     made: list[Movement] = []
     taken = np.zeros((0, 2))
     whole = int(length)
@@ -45,6 +56,8 @@ def parked(
         place = nose - TYPES[name].length / 2 * np.array([math.sin(heading), math.cos(heading)])
         near = np.hypot(*(np.concatenate([tracks, taken]) - place).T)
         if _away(buildings, (float(place[0]), float(place[1]))) < 22.0 or near.min(initial=math.inf) < clearance:
+            continue
+        if np.hypot(*(ways - place).T).min(initial=math.inf) < wing_clearance:
             continue
         taken = np.append(taken, [place], axis=0)
         n = whole + 1

@@ -64,10 +64,11 @@ def build_world(
     length = recording.length
     offset = _offset(movements, known, length, first_incident)
     incidents = script(movements, airport, length, (offset + first_incident) % length, incident_every)
+    driving = vehicles(airport, length, vehicle_count, seed)
     everything = [
         *movements,
-        *parked(airport, movements, length, parked_count, seed),
-        *vehicles(airport, length, vehicle_count, seed),
+        *parked(airport, movements, length, parked_count, seed, vehicles=driving),
+        *driving,
         *(one.vehicle for one in incidents),
         *(one.arrival for one in incidents if one.arrival is not None),
     ]

@@ -52,7 +52,8 @@ class TrackerSettings:
     false_on_pavement, false_elsewhere: false plots a m^2 and turn, at least; elsewhere more is learnt. cell_scores:
     what a plot of one, two, ... cells adds to the score of a track, the last for all larger ones. other_sensor: what
     a node event or a report adds. most_score: it grows no further. aircraft_length: what is longer is reported off
-    the pavement and starts tracks on buildings.
+    the pavement and starts tracks on buildings. apron_speed_sd: m/s of each component of the speed of what begins on
+    an apron.
     """
 
     max_lag: float = 3.0
@@ -81,6 +82,7 @@ class TrackerSettings:
     other_sensor: float = 6.0
     most_score: float = 20.0
     aircraft_length: float = 12.0
+    apron_speed_sd: float = 7.0
     shape: ShapeRule = field(default_factory=ShapeRule)
 
 

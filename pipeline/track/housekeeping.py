@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from pipeline.tables import TrackPhase
+from pipeline.tables import TargetCategory, TargetClass, TrackPhase
 from pipeline.track.contracts import Array, Expected, Floats
 from pipeline.track.core import Core, end, judge, strip_identity
 from pipeline.track.parts import absorb, join_parts
@@ -50,7 +50,12 @@ def _merge_doubles(core: Core) -> None:
     name[table.address[alive] == ""] = -1
     starved = table.radar_time[alive] < core.time - 2.2
     double = np.full(len(alive), -1, np.int64)
-    _doubles(order, state, covariance, core.extents(alive), name, starved, table.born[alive], double)
+    size = core.extents(alive)
+    # a car that says that it is one is not the large thing beside it
+    kind = np.zeros(len(alive), np.int8)
+    kind[table.claimed[alive] == TargetCategory.VEHICLE] = 1
+    kind[(kind == 0) & (table.category[alive] == TargetClass.AIRCRAFT)] = 2
+    _doubles(order, state, covariance, size, name, kind, starved, table.born[alive], double)
     table.twin[alive] = np.where(double >= 0, table.twin[alive] + 1, 0)
     ripe = np.flatnonzero(table.twin[alive] >= core.settings.merge_after)
     gone = np.zeros(n, np.bool_)
@@ -86,7 +91,15 @@ def _end_parts(core: Core) -> None:
 
 @njit(nogil=True, cache=True)
 def _doubles(
-    order: Array, state: Floats, cov: Floats, extent: Floats, name: Array, starved: Array, born: Floats, double: Array
+    order: Array,
+    state: Floats,
+    cov: Floats,
+    extent: Floats,
+    name: Array,
+    kind: Array,
+    starved: Array,
+    born: Floats,
+    double: Array,
 ) -> None:
     """For each track the senior it doubles, or -1. order: rows by east."""
     far = 60.0
@@ -100,6 +113,8 @@ def _doubles(
             if abs(n) > far or not (starved[i] or starved[j]):
                 continue
             if name[i] >= 0 and name[j] >= 0 and name[i] != name[j]:
+                continue
+            if kind[i] != kind[j] and kind[i] + kind[j] == 3:
                 continue
             wide = (0.3 * max(extent[i, 0], extent[j, 0])) ** 2
             s00 = cov[i, 0, 0] + cov[j, 0, 0] + wide

@@ -12,16 +12,16 @@ from pipeline.tables import TargetClass, TrackPhase
 from pipeline.track.contracts import Array, Floats
 from pipeline.track.core import Core, end
 
-BODY = 19.0
-"""Half the length, and half the span, that an aircraft of unknown size is taken to have; metres."""
+BODY = 21.0
+"""Half the length, and half the span, of an aircraft of unknown size, and how far off its centre may be; metres."""
 
 LONGEST = 75.0
 """No aircraft is longer; metres."""
 
 
 def join_parts(core: Core) -> None:
-    """Small unnamed tracks that stay within the body of an aircraft, or within one body of each other on the apron
-    without ever moving, become one track with the extent of all.
+    """Small unnamed tracks that stay within the body of an aircraft, or within one body of each other off runways and
+    taxiways without ever moving, become one track with the extent of all.
     """
     table, n = core.table, core.table.n
     table.body[:n][table.moving[:n] & (table.category[:n] != TargetClass.AIRCRAFT)] = 0.0
@@ -32,14 +32,17 @@ def join_parts(core: Core) -> None:
     state, covariance = core.filter.predict(table.state[alive], table.covariance[alive], dt)
     named = table.address[alive] != ""
     aircraft = table.category[alive] == TargetClass.AIRCRAFT
-    on_apron = core.zones.kind(state[:, 0], state[:, 1]) == SurfaceKind.APRON
+    kind = core.zones.kind(state[:, 0], state[:, 1])
+    on_apron = (kind != SurfaceKind.RUNWAY) & (kind != SurfaceKind.TAXIWAY)
     still = on_apron & ~table.moved[alive] & ~named
     size = core.extents(alive)
     rank = 1e6 * named + 1e3 * aircraft + size[:, 0]
     whole = np.full(len(alive), -1, np.int64)
     order = np.argsort(state[:, 0], kind="stable")
     seen = np.fmax(np.nan_to_num(table.length[alive]), np.nan_to_num(table.width[alive]))
-    _parts(order, state, covariance, size, seen, named, aircraft, still, rank, core.settings.absorb_margin, whole)
+    _parts(
+        order, state, covariance, size, seen, named, aircraft, on_apron, still, rank, core.settings.absorb_margin, whole
+    )
     table.part[alive] = np.where(whole >= 0, table.part[alive] + 1, 0)
     gone = np.zeros(n, np.bool_)
     for junior in np.flatnonzero(table.part[alive] > core.settings.merge_after):
@@ -112,7 +115,7 @@ def absorb(core: Core, senior: int, junior: int) -> None:
 @njit(nogil=True, cache=True)
 def _parts(
     order: Array, state: Floats, cov: Floats, extent: Floats, seen: Floats, named: Array, aircraft: Array,
-    still: Array, rank: Floats, margin: float, whole: Array,
+    apron: Array, still: Array, rank: Floats, margin: float, whole: Array,
 ) -> None:  # fmt: skip
     """For each track the one it is a part of, or -1. order: rows by east."""
     for a in range(len(order)):
@@ -127,11 +130,13 @@ def _parts(
                 continue
             reach = max(0.5 * max(extent[i, 0], extent[i, 1]), BODY) + margin
             apart = math.sqrt(e * e + n * n)
-            if apart > reach or (seen[j] > 25.0 and apart > 12.0):
+            if apart > reach or (seen[j] > 25.0 and apart > BODY):
                 continue
             faster = (state[i, 2] - state[j, 2]) ** 2 + (state[i, 3] - state[j, 3]) ** 2
             loose = cov[i, 2, 2] + cov[i, 3, 3] + cov[j, 2, 2] + cov[j, 3, 3]
-            if faster > 5.0 * (loose + 1.0):
+            # on the apron a track that hops from part to part seems to move
+            slack = 4.0 if apron[i] and apron[j] else 1.0
+            if faster > 5.0 * (loose + slack):
                 continue
             if whole[j] < 0 or rank[i] > rank[whole[j]]:
                 whole[j] = i

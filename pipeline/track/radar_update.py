@@ -275,6 +275,10 @@ def _begin(core: Core, sector: SectorPlots, plots: Plots, plot_rows: Array, posi
     noise = oriented_noise(plots.covariance, shape, core.settings.wander)
     made = start(core, plots.time, position, noise, Source.RADAR, core.radars[sector.radar].simulated)
     k = made.stop - made.start
+    # nothing is fast among parked aircraft, and their parts must not be taken for something that is
+    calm = np.arange(made.start, made.stop)[core.zones.kind(*position[:k].T) == SurfaceKind.APRON]
+    core.table.covariance[calm, 2, 2] = core.table.covariance[calm, 3, 3] = core.settings.apron_speed_sd**2
+    core.table.one_point[calm] = False
     core.table.radar[made] = sector.radar
     core.table.looked[sector.radar, made] = plot_rows[:k]
     core.table.length[made], core.table.width[made] = shape[:k, 0], shape[:k, 1]
