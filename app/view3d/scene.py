@@ -11,7 +11,7 @@ from app.view3d import shapes
 from app.view3d.ground import Ground
 from app.view3d.movers import ALERT_LINES, CAPACITY, RINGS, Frame, Instances, Strokes
 
-SKY = (58, 78, 102)
+SKY = (42, 52, 64)
 SKY_M = 16_000.0
 AMBIENT = 3.0
 SUN = 1.6
