@@ -44,8 +44,14 @@ FEWEST = 150
 GRASS, BUILDING = 0, 4
 """Surface kinds with bounds of their own; see `pipeline.airport.model.SurfaceKind`."""
 
-LEARN_EVERY = 4
-"""Once the start is over, a row learns in every fourth scan."""
+LEARN_EVERY = 6
+"""Once the start is over, a row learns in every sixth scan: its offsets then remember for minutes."""
+
+STILL = 1.2
+"""Steps that a patch's threshold must be off before it is moved: most rows then need no new limits."""
+
+FEW = 0.45
+"""Where less than this part of a patch is ordinary, it is the patch that has changed, not what stands on it."""
 
 START_SCANS = 30
 """For so long grass, borders and buildings learn from everything, also from what stands out."""
@@ -54,18 +60,18 @@ START_SCANS = 30
 @dataclass(eq=False, kw_only=True)
 class AdaptiveState(ArrayState):
     """offset: of each cell, in 1/128 step. level, spread, bias: of each patch, in steps. heard: scans in which each
-    patch was swept. The rest: see the kernel."""
+    patch was swept. scan: the newest, how many are over, and `heard` of the patch
+    swept last for the first time. moved: of each patch, the scan after which its base moved.
+    stale: of each row, the scan up to which its limits are true; -1 not at all. limits: uint8, 64 cells a word."""
 
     azimuths: int
     rule: tuple[float, ...]
     run_at: NDArray[np.int64]
-    run_first: NDArray[np.int64]
-    run_patch: NDArray[np.int64]
+    runs: NDArray[np.int32]
     macro: NDArray[np.int64]
     bounds: NDArray[np.int32]
     wide: NDArray[np.bool_]
     soft: NDArray[np.bool_]
-    row_limits: NDArray[np.uint8]
     tail: NDArray[np.uint8]
     offset: NDArray[np.int16] = remembered()
     level: NDArray[np.float64] = remembered()
@@ -75,6 +81,9 @@ class AdaptiveState(ArrayState):
     sums: NDArray[np.float64] = remembered()
     heard: NDArray[np.int64] = remembered()
     scan: NDArray[np.int64] = remembered()
+    moved: NDArray[np.int64] = remembered()
+    stale: NDArray[np.int64] = remembered()
+    limits: NDArray[np.uint8] = remembered()
     budget: NDArray[np.float64] = remembered()
     degraded_sweeps: NDArray[np.int64] = remembered()
 
@@ -127,7 +136,7 @@ class Adaptive:
         if surface.shape != shape:
             raise ValueError(f"surface must be {shape}, not {surface.shape}")
         patch, kind, macro = _patches(video, surface, self.macro_cell_m)
-        run_at, run_first, run_patch = _runs(patch)
+        run_at, runs = _runs(patch)
         step = video.db_per_step
         offset_db = threshold_offset_db(self.pfa, step)
         gain = 1.0 / self.offset_scans
@@ -149,22 +158,23 @@ class Adaptive:
                 float(self.learn_scans),
             ),
             run_at=run_at,
-            run_first=run_first,
-            run_patch=run_patch,
+            runs=runs,
             macro=macro,
             bounds=self._bounds(kind, step),
             wide=(kind >= EDGE) | (kind == BUILDING),
             soft=(kind >= EDGE) | (kind == BUILDING) | (kind == GRASS),
-            row_limits=np.full(64 * video.words, 255, np.uint8),
             tail=np.zeros(64, np.uint8),
             offset=np.zeros(shape, np.int16),
             level=np.zeros(patches),
             spread=np.full(patches, rayleigh),
             bias=np.zeros(patches),
             base=np.full(patches, 10_000, np.int32),
-            sums=np.zeros((patches, 4)),
+            sums=np.zeros((patches, 5)),
             heard=np.zeros(patches, np.int64),
-            scan=np.array([-1], np.int64),
+            scan=np.array([-1, 0, 0], np.int64),
+            moved=np.zeros(patches, np.int64),
+            stale=np.full(video.azimuths, -1, np.int64),
+            limits=np.full((video.azimuths, 64 * video.words), 255, np.uint8),
             budget=np.array([CapSettings.of(self.max_runs, video.azimuths).depth]),
             degraded_sweeps=np.zeros(1, np.int64),
         )
@@ -180,10 +190,21 @@ class Adaptive:
             sweeps.scan,
             mask,
             state.rule,
-            (state.run_at, state.run_first, state.run_patch, state.macro, state.bounds, state.wide, state.soft),
-            (state.offset, state.level, state.spread, state.bias, state.base, state.sums, state.heard, state.scan),
+            (state.run_at, state.runs, state.macro, state.bounds, state.wide, state.soft),
+            (
+                state.offset,
+                state.level,
+                state.spread,
+                state.bias,
+                state.base,
+                state.sums,
+                state.heard,
+                state.scan,
+                state.moved,
+                state.stale,
+            ),
             (cap.refill, cap.depth, state.budget, state.degraded_sweeps),
-            state.row_limits,
+            state.limits,
             state.tail,
         )
         return Detections(mask, degraded=int(state.degraded_sweeps[0]) > before)
@@ -235,14 +256,16 @@ def _macro_cells(video: VideoFormat, size_m: float) -> NDArray[np.int64]:
     return np.asarray(ring * 100_000 + (turn * bands).astype(np.int64))
 
 
-def _runs(patch: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Runs of one patch along each row: first run of each row (rows + 1), first cell and patch of each run."""
+def _runs(patch: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Runs of one patch along each row: first run of each row (rows + 1); first cell, end and patch of each run."""
     starts = np.ones(patch.shape, bool)
     starts[:, 1:] = patch[:, 1:] != patch[:, :-1]
     row, cell = np.nonzero(starts)
     run_at = np.zeros(len(patch) + 1, np.int64)
     np.cumsum(np.bincount(row, minlength=len(patch)), out=run_at[1:])
-    return run_at, cell.astype(np.int64), patch[row, cell].astype(np.int64)
+    end = np.append(cell[1:], 0)
+    end[end == 0] = patch.shape[1]
+    return run_at, np.stack([cell, end, patch[row, cell]], axis=1).astype(np.int32)
 
 
 @lru_cache(maxsize=16)
@@ -268,32 +291,27 @@ def _detect(
     limits: Any,
     tail: Any,
 ) -> None:
-    run_at, run_first, run_patch = layout[0], layout[1], layout[2]
-    offset, base, heard, current = memory[0], memory[4], memory[6], memory[7]
+    current = memory[7]
     refill, depth, budget, degraded = cap
     n, ranges = amplitude.shape
     words = mask.shape[1]
     whole = ranges // 64
-    limits_at, tail_at = limits.ctypes.data, tail.ctypes.data
+    tail_at = tail.ctypes.data
     for i in range(n):
         if scan != current[0]:
             if current[0] >= 0:
                 _finish_scan(rule, layout, memory)
             current[0] = scan
         row = rows[i]
-        cells = amplitude[i]
-        own = offset[row]
-        for k in range(run_at[row], run_at[row + 1]):
-            end = run_first[k + 1] if k + 1 < run_at[row + 1] else ranges
-            p = run_patch[k]
-            _limit(own[run_first[k] : end], base[p] if heard[p] >= rule[8] else 10_000, limits[run_first[k] : end])
-        bits = mask[i]
-        row_at = cells.ctypes.data
+        cells, limit, bits = amplitude[i], limits[row], mask[i]
+        _refresh(row, limit, rule, layout, memory)
+        row_at, limits_at = cells.ctypes.data, limit.ctypes.data
         anything = np.uint64(0)
         for w in range(whole):
             at = np.uintp(64 * w)
-            bits[w] = bits_above(row_at + at, limits_at + at)
-            anything |= bits[w]
+            word = bits_above(row_at + at, limits_at + at)
+            bits[w] = word
+            anything |= word
         if words > whole:
             for j in range(ranges - 64 * whole):
                 tail[j] = cells[64 * whole + j]
@@ -307,87 +325,88 @@ def _detect(
             else:
                 degraded[0] += 1
                 fit_row(cells, limits_at, bits, budget, tail)
-        _learn(cells, row, (scan + row) % LEARN_EVERY == 0, rule, layout, memory)
+        due = (scan + row) % LEARN_EVERY == 0
+        if due or current[2] < rule[5]:
+            _learn(cells, limit, row, due, rule, layout, memory)
 
 
 @njit(nogil=True, cache=True)
-def _limit(own: Any, base: int, limits: Any) -> None:
-    for j in range(own.size):
-        limit = base + ((own[j] + ONE // 2) >> 7)
-        limits[j] = np.uint8(min(max(limit, 0), 255))
+def _refresh(row: int, limit: Any, rule: Any, layout: Any, memory: Any) -> None:
+    """Bring the row's limits up to date where its patches or its offsets have moved since it was last swept."""
+    run_at, runs = layout[0], layout[1]
+    base, heard, moved, stale = memory[4], memory[6], memory[8], memory[9]
+    own = memory[0][row]
+    everything = stale[row] < 0
+    for k in range(np.uintp(run_at[row]), np.uintp(run_at[row + 1])):
+        p = np.uintp(runs[k, 2])
+        if not everything and moved[p] <= stale[row]:
+            continue
+        level = np.int32(base[p]) if heard[p] >= rule[8] else np.int32(10_000)
+        for j in range(np.uintp(runs[k, 0]), np.uintp(runs[k, 1])):
+            value = level + ((np.int32(own[j]) + np.int32(ONE // 2)) >> np.int32(7))
+            limit[j] = np.uint8(min(max(value, np.int32(0)), np.int32(255)))
+    stale[row] = memory[7][1]
 
 
 @njit(nogil=True, cache=True)
-def _learn(cells: Any, row: int, due: bool, rule: Any, layout: Any, memory: Any) -> None:
-    """Take one row into the sums of its patches, and let its offsets follow. due: also where the start is over."""
+def _learn(cells: Any, limit: Any, row: int, due: bool, rule: Any, layout: Any, memory: Any) -> None:
+    """Take one row into the sums of its patches, and let its offsets and limits follow. due: also the old patches."""
     _, rayleigh, margin, _, _, long, below, above, _ = rule
-    run_at, run_first, run_patch, _, bounds, _, soft = layout
-    offset, level, spread, bias, base, sums, heard, _ = memory
+    run_at, runs, _, bounds, _, soft = layout
+    offset, level, spread, bias, base, sums, heard, _, _, _ = memory
     own = offset[row]
-    errors_within = (np.int32(-below * ONE), np.int32(above * ONE))
-    for k in range(run_at[row], run_at[row + 1]):
-        p = run_patch[k]
+    least_error, most_error = np.int32(-below * ONE), np.int32(above * ONE)
+    for k in range(np.uintp(run_at[row]), np.uintp(run_at[row + 1])):
+        p = np.uintp(runs[k, 2])
         age = np.float64(heard[p])
         if not due and age >= long:
             continue
-        end = run_first[k + 1] if k + 1 < run_at[row + 1] else cells.size
-        gain = max(1.0 / long, 1.0 / (age + (2.0 if soft[p] else 12.0))) if age > 0 else 0.0
-        everything = soft[p] and age < START_SCANS
-        _learn_run(
-            cells[run_first[k] : end],
-            own[run_first[k] : end],
-            (np.int32(level[p] * ONE), np.int32(bias[p] * ONE)),
-            (
-                np.int32((base[p] - margin * _scale(spread[p], rayleigh)) * ONE),
-                np.int32(2**30) if everything else np.int32(0),
-            ),
-            errors_within,
-            np.int32(8192 * gain),
-            (bounds[p, 0], bounds[p, 1]),
-            sums[p],
-        )
-
-
-@njit(nogil=True, cache=True)
-def _learn_run(
-    cells: Any, own: Any, centre: Any, ceiling: Any, errors_within: Any, gain: Any, bounds: Any, total: Any
-) -> None:
-    # Without a branch and in 32 bits, so that the compiler makes it one loop of vectors.
-    middle, bias = centre
-    least_error, most_error = errors_within
-    least, most = bounds
-    ordinary, learnable = ceiling[0], ceiling[0] + ceiling[1]
-    count, first, errors = np.int32(0), np.int64(0), np.int64(0)
-    second = np.int64(0)
-    for j in range(own.size):
-        rest = (np.int32(cells[j]) << np.int32(7)) - np.int32(own[j])
-        apart = rest - middle
-        kept = np.int32(rest <= ordinary)
-        error = min(max(apart, least_error), most_error)
-        coarse = (apart >> np.int32(3)) * kept
-        count += kept
-        first += np.int64(apart * kept)
-        second += np.int64(coarse * coarse)
-        errors += np.int64(error * kept)
-        step = (((error - bias) * gain) >> np.int32(13)) * np.int32(rest <= learnable)
-        own[j] = np.int16(min(max(np.int32(own[j]) + step, least), most))
-    total[0] += count
-    total[1] += first
-    total[2] += 64.0 * second
-    total[3] += errors
+        step = max(1.0 / long, 1.0 / (age + (2.0 if soft[p] else 12.0))) if age > 0 else 0.0
+        gain = np.int32(8192 * step)
+        middle, centre = np.int32(level[p] * ONE), np.int32(bias[p] * ONE)
+        ordinary = np.int32((base[p] - margin * _scale(spread[p], rayleigh)) * ONE)
+        learnable = np.int32(2**30) if soft[p] and age < START_SCANS else ordinary
+        least, most = bounds[p, 0], bounds[p, 1]
+        shown = np.int32(base[p]) if age >= rule[8] else np.int32(10_000)
+        count, first, second, errors = np.int32(0), np.int32(0), np.int32(0), np.int32(0)
+        # without a branch and in 32 bits, so that the compiler makes it one loop of vectors
+        for j in range(np.uintp(runs[k, 0]), np.uintp(runs[k, 1])):
+            rest = (np.int32(cells[j]) << np.int32(7)) - np.int32(own[j])
+            apart = rest - middle
+            kept = np.int32(rest <= ordinary)
+            error = min(max(apart, least_error), most_error)
+            coarse = (apart >> np.int32(5)) * kept
+            count += kept
+            first += (apart >> np.int32(2)) * kept
+            second += coarse * coarse
+            errors += (error >> np.int32(2)) * kept
+            change = (((error - centre) * gain) >> np.int32(13)) * np.int32(rest <= learnable)
+            new = min(max(np.int32(own[j]) + change, least), most)
+            own[j] = np.int16(new)
+            value = shown + ((new + np.int32(ONE // 2)) >> np.int32(7))
+            limit[j] = np.uint8(min(max(value, np.int32(0)), np.int32(255)))
+        sums[p, 0] += count
+        sums[p, 1] += 4.0 * first
+        sums[p, 2] += 1024.0 * second
+        sums[p, 3] += 4.0 * errors
+        sums[p, 4] += runs[k, 1] - runs[k, 0]
 
 
 @njit(nogil=True, cache=True)
 def _finish_scan(rule: Any, layout: Any, memory: Any) -> None:
     """Bring the patches that were swept up to date with the scan that is over."""
-    mu, rayleigh, level_gain, spread_gain = rule[0], rule[1], rule[3], rule[4]
-    macro, wide, soft = layout[3], layout[5], layout[6]
-    _, level, spread, bias, base, sums, heard, _ = memory
+    mu, rayleigh, margin, level_gain, spread_gain = rule[0], rule[1], rule[2], rule[3], rule[4]
+    macro, wide, soft = layout[2], layout[4], layout[5]
+    _, level, spread, bias, base, sums, heard, current, moved_at, _ = memory
+    current[1] += 1
     changes = np.zeros((macro.max() + 1, 2))
     fresh = np.zeros(level.size, np.bool_)
     for p in range(level.size):
-        count = sums[p, 0]
-        if count > 0:
+        count, swept = sums[p, 0], sums[p, 4]
+        if swept > 0 and count < FEW * swept:
+            level[p] += margin  # most of it stands out: the ground itself has risen
+            heard[p] += 1
+        elif count > 0:
             moved = sums[p, 1] / count / ONE
             variance = max(sums[p, 2] / count / ONE**2 - moved**2, 0.0)
             faster = max(spread_gain, 1.0 / (heard[p] + 1.0))
@@ -408,8 +427,16 @@ def _finish_scan(rule: Any, layout: Any, memory: Any) -> None:
     for p in range(level.size):
         if wide[p] and not fresh[p] and changes[macro[p], 1] > 0:
             level[p] += changes[macro[p], 0] / changes[macro[p], 1]
+        if heard[p] == 0:
+            continue
+        wanted = level[p] + mu * _scale(spread[p], rayleigh)
+        if abs(wanted - base[p]) > STILL or heard[p] == np.int64(rule[8]):
+            base[p] = np.int32(np.floor(wanted + 0.5))
+            moved_at[p] = current[1]
+    current[2] = current[1]
+    for p in range(level.size):
         if heard[p] > 0:
-            base[p] = np.int32(np.floor(level[p] + mu * _scale(spread[p], rayleigh) + 0.5))
+            current[2] = min(current[2], heard[p])
     if fresh.any():
         _start_wide(layout, memory, fresh)
 
@@ -423,8 +450,9 @@ def _scale(spread: float, rayleigh: float) -> float:
 @njit(nogil=True, cache=True)
 def _start_wide(layout: Any, memory: Any, fresh: Any) -> None:
     """Cells beside a border begin at the greatest level of their macro-cell, and come down to their own."""
-    run_at, run_first, run_patch, macro, bounds, _, _ = layout
-    offset, level, heard = memory[0], memory[1], memory[6]
+    run_at, runs, macro, bounds, _, _ = layout
+    offset, level, heard, stale = memory[0], memory[1], memory[6], memory[9]
+    stale[:] = -1
     highest = np.zeros(macro.max() + 1)
     for p in range(level.size):
         if heard[p] > 0:
@@ -432,10 +460,9 @@ def _start_wide(layout: Any, memory: Any, fresh: Any) -> None:
     for row in range(offset.shape[0]):
         own = offset[row]
         for k in range(run_at[row], run_at[row + 1]):
-            p = run_patch[k]
+            p = runs[k, 2]
             if not fresh[p]:
                 continue
-            end = run_first[k + 1] if k + 1 < run_at[row + 1] else own.size
             up = min(np.int64((highest[macro[p]] - level[p]) * ONE), np.int64(bounds[p, 1]))
-            for j in range(run_first[k], end):
+            for j in range(runs[k, 0], runs[k, 1]):
                 own[j] = up
