@@ -107,12 +107,29 @@ class Table:
             return cls.empty()
         if len(tables) == 1:
             return tables[0]
-        return cls(**{name: np.concatenate([getattr(t, name) for t in tables]) for name in _declared(cls)})
+        return cls._of_good({name: np.concatenate([getattr(t, name) for t in tables]) for name in _declared(cls)})
 
     def replace(self, **columns: Any) -> Self:
         """The same table with some columns exchanged (converted to their dtype)."""
-        everything = {name: getattr(self, name) for name in _declared(type(self))}
-        return type(self).build(len(self), **{**everything, **columns})
+        declared = _declared(type(self))
+        unknown = set(columns) - set(declared)
+        if unknown:
+            raise TableError(f"{type(self).__name__} has no column {', '.join(sorted(unknown))}")
+        rows = len(self)
+        everything = {name: getattr(self, name) for name in declared}
+        for name, values in columns.items():
+            one = declared[name]
+            everything[name] = np.ascontiguousarray(
+                np.broadcast_to(np.asarray(values, dtype=one.dtype), (rows, *one.shape))
+            )
+        return type(self)._of_good(everything)
+
+    @classmethod
+    def _of_good(cls, columns: dict[str, Array]) -> Self:
+        """A table of columns that come from tables of this kind, all cut alike, so that they need no check."""
+        made = object.__new__(cls)
+        made.__dict__.update(columns)
+        return made
 
     def __len__(self) -> int:
         name = next(iter(_declared(type(self))))
@@ -121,4 +138,4 @@ class Table:
     def __getitem__(self, rows: Any) -> Self:
         if isinstance(rows, int | np.integer):
             rows = slice(int(rows), int(rows) + 1 if rows != -1 else None)
-        return type(self)(**{name: getattr(self, name)[rows] for name in _declared(type(self))})
+        return self._of_good({name: getattr(self, name)[rows] for name in _declared(type(self))})

@@ -63,7 +63,7 @@ class TrackerSettings:
     tentative_penalty: float = 6.0
     ignore_plots_on_buildings: bool = True
     report_fixed_off_pavement: bool = False
-    moved_by: float = 20.0
+    moved_by: float = 30.0
     radar_ceiling: float = 50.0
     source_memory: float = 5.0
     report_gate: float = 25.0
@@ -125,9 +125,7 @@ class Core:
 
     def extents(self, rows: Array | slice = slice(None)) -> Floats:
         """(k, 3) length, width, direction of tracks for gating; zeros where unknown, those seen in parts whole."""
-        made = extents(*(self.column(name)[rows] for name in ("length", "width", "heading", "axis")))
-        np.maximum(made[:, :2], 2.0 * self.column("body")[rows][:, None], out=made[:, :2])
-        return made
+        return extents(*(self.column(name)[rows] for name in ("length", "width", "heading", "axis", "body")))
 
     @property
     def timed(self) -> bool:
@@ -150,6 +148,8 @@ class Core:
 
 def take(core: Core, rows: Array, time: Floats, position: Floats, noise: Floats, source: Source) -> None:
     """Tracks `rows` (k,), each once, take a position (k, 2) with noise (k, 2, 2) at time (k,)."""
+    if not len(rows):
+        return
     table = core.table
     dt = time - table.time[rows]
     second = table.one_point[rows] & (dt >= 0.3)

@@ -14,8 +14,10 @@ from pipeline.track.core import Core, start, take
 from pipeline.track.look import Looks, RadarClock, plan_looks
 from pipeline.track.shape import oriented_noise, plot_extents, reshape
 
-PAVED = (SurfaceKind.RUNWAY, SurfaceKind.TAXIWAY, SurfaceKind.APRON, SurfaceKind.ROAD)
-"""Where targets are at home and false plots are few."""
+PAVED = np.isin(np.arange(256), (SurfaceKind.RUNWAY, SurfaceKind.TAXIWAY, SurfaceKind.APRON, SurfaceKind.ROAD))
+"""(256,) by SurfaceKind: where targets are at home and false plots are few."""
+
+NO_PLOTS = Plots.empty()
 
 SETTLED = 3
 """Extents seen before a track's own extent may absorb plots."""
@@ -32,7 +34,8 @@ def take_sector(core: Core, sector: SectorPlots) -> None:
     core.count("sector_degraded", int(sector.degraded))
     fresh = _usable(core, sector)
     plots = Plots.concatenate([core.waiting[sector.radar], fresh]) if len(core.waiting[sector.radar]) else fresh
-    plots = plots[np.lexsort((plots.north, plots.east, plots.time))]
+    if len(plots) > 1:
+        plots = plots[np.lexsort((plots.north, plots.east, plots.time))]
     rows = _absolute_rows(core, sector.radar, plots)
     clock.set_by(rows, plots.time, site.video.azimuths)
     stale = rows < sector.closed_to - 2 * site.video.azimuths
@@ -40,7 +43,7 @@ def take_sector(core: Core, sector: SectorPlots) -> None:
     if stale.any():
         plots, rows = plots[~stale], rows[~stale]
     wait = _decide(core, sector, plots, rows)
-    core.waiting[sector.radar] = plots[wait] if wait.any() else Plots.empty()
+    core.waiting[sector.radar] = plots[wait] if wait.any() else NO_PLOTS
 
 
 def _acceptable(core: Core, sector: SectorPlots) -> bool:
@@ -75,6 +78,8 @@ def _restart(core: Core, sector: SectorPlots) -> None:
 def _usable(core: Core, sector: SectorPlots) -> Plots:
     """The plots of a sector without those that cannot be true."""
     plots = sector.plots
+    if not len(plots):
+        return plots
     cov = plots.covariance
     sane = np.isfinite(plots.time) & np.isfinite(plots.east) & np.isfinite(plots.north) & np.isfinite(plots.azimuth)
     sane &= np.isfinite(plots.range) & np.isfinite(cov).all(axis=(1, 2))
@@ -111,6 +116,8 @@ def _decide(core: Core, sector: SectorPlots, plots: Plots, plot_rows: Array) -> 
     )  # fmt: skip
     farthest = max(sector.closed_to, int(plot_rows.max()) if len(plot_rows) else 0)
     near = np.flatnonzero(looks.covered & (looks.row - looks.guard <= farthest))
+    if not len(near) and not len(plots):
+        return _nothing(core, radar, looks)
     state, covariance = core.filter.predict(
         table.state[near], table.covariance[near], looks.time[near] - table.time[near]
     )
@@ -142,14 +149,22 @@ def _decide(core: Core, sector: SectorPlots, plots: Plots, plot_rows: Array) -> 
     _hit(core, near[due], taken, plots, position, noise, shape, left, owning)
     _miss(core, near[due][taken < 0], looks)
     table.looked[radar, near[due]] = looks.row[near[due]]
-    out = ~looks.covered & looks.due
-    table.looked[radar, :n][out] = looks.row[out]
+    _nothing(core, radar, looks)
     _begin(core, sector, plots[left[owner < 0]], plot_rows[left[owner < 0]], position[left[owner < 0]])
     return wait
 
 
+def _nothing(core: Core, radar: int, looks: Looks) -> Array:
+    """Tracks that the radar cannot see count as looked at; no plot waits."""
+    out = ~looks.covered & looks.due
+    core.table.looked[radar, : core.table.n][out] = looks.row[out]
+    return np.zeros(0, np.bool_)
+
+
 def _rescue(rows: Array, taken: Array, left: Array, owner: Array) -> None:
     """Tracks `rows` that took nothing although a plot lies within them take it; `taken` and `owner` are changed."""
+    if not (owner >= 0).any():
+        return
     for k in np.flatnonzero(taken < 0):
         mine = np.flatnonzero(owner == rows[k])
         if len(mine):
@@ -169,7 +184,7 @@ def _score(
         return
     spread = covariance[hit, :2, :2] + plots.covariance[plot]
     place = np.stack([plots.east[plot], plots.north[plot]], axis=1)
-    paved = np.isin(core.zones.kind(place[:, 0], place[:, 1]), PAVED)
+    paved = PAVED[core.zones.kind(place[:, 0], place[:, 1])]
     learnt = core.false_plots[radar].density(place)
     false = np.where(paved, settings.false_on_pavement, np.maximum(learnt, settings.false_elsewhere))
     volume = 2 * math.pi * np.sqrt(spread[:, 0, 0] * spread[:, 1, 1] - spread[:, 0, 1] ** 2)
@@ -206,6 +221,8 @@ def _hit(
     """Tracks take their plots, together with what was left over inside their extent."""
     hit = taken >= 0
     rows, taken = rows[hit], taken[hit]
+    if not len(rows):
+        return
     position, shape = position[taken], shape[taken]
     extra = np.flatnonzero(np.isin(owner, rows))
     if len(extra):

@@ -36,35 +36,24 @@ def plot_extents(plots: Plots) -> Floats:
     extents where the extractor gave no axes.
     """
     made = np.empty((len(plots), 3))
-    made[:, 0], made[:, 1], made[:, 2] = plots.length, plots.width, plots.bearing
-    bare = ~(np.isfinite(made[:, 0]) & (made[:, 0] > 0))
-    if bare.any():
-        deep = np.nan_to_num(plots.range_extent[bare].astype(np.float64), posinf=0.0)
-        wide = np.nan_to_num(plots.azimuth_extent[bare] * plots.range[bare], posinf=0.0)
-        made[bare, 0], made[bare, 1] = np.maximum(deep, wide), np.minimum(deep, wide)
-        across = plots.azimuth[bare] + math.pi / 2
-        made[bare, 2] = np.where(deep >= wide, plots.azimuth[bare], across) % math.pi
-    made[:, 1] = np.where(np.isfinite(made[:, 1]), made[:, 1], 0.0)
-    return np.clip(made, [0.0, 0.0, -np.inf], [200.0, 200.0, np.inf])
+    _plot_extents(
+        plots.length, plots.width, plots.bearing, plots.range_extent, plots.azimuth_extent, plots.range, plots.azimuth,
+        made,
+    )  # fmt: skip
+    return made
 
 
-def extents(length: Array, width: Array, heading: Array, axis: Array) -> Floats:
-    """(n, 3) length, width and direction of tracks for gating; zeros where unknown."""
-    direction = np.where(np.isfinite(heading), heading, axis)
-    return np.asarray(np.nan_to_num(np.stack([length, width, direction], axis=1)))
+def extents(length: Array, width: Array, heading: Array, axis: Array, body: Array) -> Floats:
+    """(n, 3) length, width and direction of tracks for gating; zeros where unknown. body: m, half the least size."""
+    made = np.empty((len(length), 3))
+    _extents(length, width, heading, axis, body, made)
+    return made
 
 
 def oriented_noise(noise: Floats, extent: Floats, part: float) -> Floats:
     """noise (m, 2, 2) plus the wander of an extended target's centroid: sd `part` of its length and of its width."""
-    direction = np.where(np.isfinite(extent[:, 2]), extent[:, 2], 0.0)
-    along, across = (part * extent[:, 0]) ** 2, (part * extent[:, 1]) ** 2
-    across = np.where(np.isfinite(extent[:, 2]), across, along)
-    s, c = np.sin(direction), np.cos(direction)
     made = noise.copy()
-    made[:, 0, 0] += along * s * s + across * c * c
-    made[:, 1, 1] += along * c * c + across * s * s
-    made[:, 0, 1] += (along - across) * s * c
-    made[:, 1, 0] += (along - across) * s * c
+    _wander(extent, part, made)
     return made
 
 
@@ -77,6 +66,53 @@ def reshape(
         rule.grow, rule.shrink, rule.start_speed, rule.stop_speed, rule.reverse_speed, rule.bearing_sd, rule.sure
     ])  # fmt: skip
     _reshape(settings, rows, state, covariance, moved, plot, bearing_sd, length, width, heading, axis, moving, shapes)
+
+
+@njit(nogil=True, cache=True)
+def _plot_extents(
+    length: Array,
+    width: Array,
+    bearing: Array,
+    deep: Array,
+    turn: Array,
+    distance: Floats,
+    azimuth: Floats,
+    out: Floats,
+) -> None:
+    for k in range(len(out)):
+        along, across, direction = float(length[k]), float(width[k]), float(bearing[k])
+        if not (math.isfinite(along) and along > 0.0):
+            a, b = float(deep[k]), float(turn[k]) * distance[k]
+            a, b = (a if math.isfinite(a) else 0.0), (b if math.isfinite(b) else 0.0)
+            along, across = max(a, b), min(a, b)
+            direction = (azimuth[k] if a >= b else azimuth[k] + 0.5 * math.pi) % math.pi
+        out[k, 0] = min(max(along, 0.0), 200.0)
+        out[k, 1] = min(max(across, 0.0), 200.0) if math.isfinite(across) else 0.0
+        out[k, 2] = direction
+
+
+@njit(nogil=True, cache=True)
+def _extents(length: Floats, width: Floats, heading: Floats, axis: Floats, body: Floats, out: Floats) -> None:
+    for k in range(len(out)):
+        direction = heading[k] if math.isfinite(heading[k]) else axis[k]
+        least = 2.0 * body[k]
+        out[k, 0] = max(length[k] if math.isfinite(length[k]) else 0.0, least)
+        out[k, 1] = max(width[k] if math.isfinite(width[k]) else 0.0, least)
+        out[k, 2] = direction if math.isfinite(direction) else 0.0
+
+
+@njit(nogil=True, cache=True)
+def _wander(extent: Floats, part: float, noise: Floats) -> None:
+    for k in range(len(extent)):
+        direction = extent[k, 2]
+        along, across = (part * extent[k, 0]) ** 2, (part * extent[k, 1]) ** 2
+        if not math.isfinite(direction):
+            direction, across = 0.0, along
+        s, c = math.sin(direction), math.cos(direction)
+        noise[k, 0, 0] += along * s * s + across * c * c
+        noise[k, 1, 1] += along * c * c + across * s * s
+        noise[k, 0, 1] += (along - across) * s * c
+        noise[k, 1, 0] += (along - across) * s * c
 
 
 @njit(nogil=True, cache=True)

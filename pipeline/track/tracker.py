@@ -127,7 +127,7 @@ class Tracker:
         known = table.moved[rows] | (table.address[rows] != "") | (table.node_time[rows] > NEVER)
         known |= table.report_time[rows] > NEVER
         known |= (table.length[rows] >= core.settings.aircraft_length) & (table.shapes[rows] >= SETTLED)
-        return np.asarray(known | np.isin(core.zones.kind(state[:, 0], state[:, 1]), PAVED))
+        return np.asarray(known | PAVED[core.zones.kind(state[:, 0], state[:, 1])])
 
     def save(self) -> dict[str, Any]:
         """The whole state, as copies of arrays and plain values, for `restore` of a tracker of the same make."""
