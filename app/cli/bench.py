@@ -17,6 +17,7 @@ def register(app: typer.Typer) -> None:
     group = typer.Typer(invoke_without_command=True)
     group.callback()(bench)
     group.command("picture")(picture)
+    group.command("soak")(soak)
     app.add_typer(group, name="bench")
 
 
@@ -24,6 +25,8 @@ def bench(
     context: typer.Context,
     repeats: Annotated[int, typer.Option(min=3, help="Turns measured for each line; the median is printed.")] = 60,
     peers: Annotated[bool, typer.Option(help="Also measure numpy, scipy and OpenCV on the same input.")] = True,
+    service: Annotated[bool, typer.Option(help="Also run the service: intake, delay, clients (two minutes).")] = True,
+    seconds: Annotated[float, typer.Option(min=2.0, help="Length of each measurement of the service.")] = 15.0,
 ) -> None:
     """Measure the stages on this machine, side by side in one run.
 
@@ -38,7 +41,45 @@ def bench(
     with console.status("Compiling, or loading compiled kernels ..."):
         table = _front_end(repeats, peers)
     console.print(table)
-    # further sections (tracker, datagram to client) print their own tables here
+    with console.status("Tracking a thousand targets ..."):
+        lines = _tracker(peers)
+    console.print("\n".join(lines), highlight=False)
+    if service:
+        from app.bench.report import service_table
+
+        with console.status("Starting the service ...") as status:
+            table = service_table(seconds, lambda what: status.update(f"Measuring: {what} ..."))
+        console.print(table)
+
+
+def soak(
+    minutes: Annotated[int, typer.Option(min=2, help="Minutes of the demonstration to run.")] = 60,
+) -> None:
+    """Run the demonstration for an hour of its own time as fast as this machine can; does memory stay flat?"""
+    import tempfile
+    from pathlib import Path
+
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from app.bench.soak import soak as run
+
+    with Progress(transient=True) as progress, tempfile.TemporaryDirectory() as folder:
+        task = progress.add_task("Minutes of the demonstration", total=minutes)
+        result = run(minutes, Path(folder), lambda done: progress.update(task, completed=done))
+    Console().print(
+        f"{minutes} minutes at {result.speed:.1f} times the clock: {result.resident_mib[-1]:.0f} MiB at the end,"
+        f" {result.growth_mib:+.1f} MiB since a tenth of the way",
+        highlight=False,
+    )
+
+
+def _tracker(peers: bool) -> tuple[str, ...]:
+    import time
+
+    from pipeline.measure.bench_tracker import bench_tracker
+
+    return ("Tracker, 1000 targets, one turn", *bench_tracker(time.perf_counter, compare=peers).lines())
 
 
 def picture(
