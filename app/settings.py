@@ -35,7 +35,9 @@ class UdpSettings(Section):
     port: int = Field(8600, ge=0, le=65535, description="UDP port; 0 lets the system choose")
     group: str | None = Field(None, description="multicast group to join")
     interface: str = Field("0.0.0.0", description="address of the interface on which the group is joined")
-    edition: Literal["1.2", "1.3"] = Field("1.3", description="edition of CAT240; it is not on the wire")
+    edition: Literal["1.2", "1.3"] = Field(
+        "1.3", description="edition of CAT240 agreed with the radar, a note: both are read alike (1.2 unverified)"
+    )
     sac: int | None = Field(None, ge=0, le=255, description="take only this system area code")
     sic: int | None = Field(None, ge=0, le=255, description="take only this system identification code")
 

@@ -29,6 +29,15 @@ if TYPE_CHECKING:
     from app.store.store import Store
 
 
+DESCRIPTION = """
+Times are Unix seconds (UTC). Angles are degrees clockwise from true north. Positions are WGS 84 degrees and metres east
+and north of the airport's reference point. What is not known is null. `mode` is in every answer: anything but `live` is
+no live traffic. Errors are `application/problem+json` (RFC 9457) with the fault in `detail`.
+
+The live feed is a WebSocket at `/api/v1/live`, described in `/asyncapi.json`.
+"""
+
+
 def create_app(service: Service, *, hub: Hub, store: Store | None, view3d_router: APIRouter | None = None) -> FastAPI:
     """The application over a service that may still be starting. The hub begins and ends with the application."""
     settings = service.settings
@@ -45,7 +54,7 @@ def create_app(service: Service, *, hub: Hub, store: Store | None, view3d_router
     app = FastAPI(
         title="Airside",
         summary="Live picture and runway alerts of the airport surface",
-        description=models.__doc__ or "",
+        description=DESCRIPTION,
         version=version("airside"),
         docs_url=None,
         redoc_url=None,

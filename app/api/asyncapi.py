@@ -14,8 +14,9 @@ from app.live.messages import SUBPROTOCOL
 DESCRIPTION = f"""
 Open the WebSocket with the subprotocol `{SUBPROTOCOL}`, say `hello`, get `welcome`, say `subscribe`, get `result` and
 a snapshot of each topic, then deltas at the granted rate, every alert at once, `status` about once a second, and a
-`heartbeat` when nothing else is sent. To resume after a lost connection, send in `hello` the `epoch` and `seq` of the
-last message that was taken after the snapshot; the `result` of the subscription says whether the place was recovered.
+`heartbeat` when nothing else is sent. To resume after a lost connection, say `hello` with `resume`: the `epoch` and
+`seq` of the last message that was taken after the snapshot, `{{"epoch": ..., "seq": ...}}`; the `result` of the
+subscription says whether the place was recovered.
 
 Closed with 1008 (hostile or silent), 1009 (frame too long), 1013 (too many clients, or more than 10 s behind: try
 again later), 1001 (the service ends).

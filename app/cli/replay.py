@@ -61,7 +61,8 @@ def replay(
             address, chosen = _destination(loaded, radar, to)
             if chosen is not None and to is None:
                 _must_fit(recording, chosen)
-            _send(console, recording, address, speed, loop)
+            interface = chosen.udp.interface if chosen is not None and chosen.udp is not None else "0.0.0.0"
+            _send(console, recording, address, interface, speed, loop)
     except (Refused, SettingsError, OSError) as error:
         raise fail(str(error)) from error
     except KeyboardInterrupt:
@@ -134,10 +135,12 @@ def _progress(console: Console) -> Any:
     return Progress(*columns, console=console)
 
 
-def _send(console: Console, recording: Recording, address: tuple[str, int], speed: float, loop: bool) -> None:
+def _send(
+    console: Console, recording: Recording, address: tuple[str, int], interface: str, speed: float, loop: bool
+) -> None:
     from app.ingest.replay import Replayer
 
-    replayer = Replayer(recording, address, speed)
+    replayer = Replayer(recording, address, speed, interface=interface)
     with _progress(console) as progress:
         total = None if loop else recording.scans
         task = progress.add_task(f"to udp://{address[0]}:{address[1]}", total=total)

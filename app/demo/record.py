@@ -51,7 +51,15 @@ def record_video(
         for scan in range(scans):
             made[scan] = video.sweeps(scan, 0, grid.azimuths, world.truth)
             progress()
-        np.savez_compressed(path, scans=made, t=start + np.arange(scans) * grid.period_s)
+        np.savez_compressed(
+            path,
+            scans=made,
+            t=start + np.arange(scans) * grid.period_s,
+            first_range_m=grid.first_range_m,
+            range_step_m=grid.range_step_m,
+            beamwidth_deg=np.rad2deg(grid.beamwidth_rad),
+            db_per_step=grid.db_per_step,
+        )
     else:
         _capture(path, VideoChannel(video, world), scans, settings.demo.udp_port, progress)
     return _write_truth(path.with_suffix(".truth.csv"), world, start, scans, site.video.period_s)

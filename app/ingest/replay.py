@@ -24,11 +24,20 @@ class Replayer:
     """Sends the sweeps of a recording to one UDP address.
 
     The first sweep is sent as of now; the times of day go on as in the recording, so that `speed` times the pace gives
-    `speed` times the clock, and speeds of targets stay true. Raises OSError where the socket does.
+    `speed` times the clock, and speeds of targets stay true.
+
+    interface: address of the interface by which a multicast group is sent to; 0.0.0.0 leaves it to the system. Raises OSError where the socket does, or when `interface` is no address.
     """
 
     def __init__(
-        self, recording: Recording, address: tuple[str, int], speed: float = 1.0, *, sac: int = 0, sic: int = 1
+        self,
+        recording: Recording,
+        address: tuple[str, int],
+        speed: float = 1.0,
+        *,
+        sac: int = 0,
+        sic: int = 1,
+        interface: str = "0.0.0.0",
     ) -> None:
         self._recording, self._speed = recording, speed
         self._source = (sac, sic)
@@ -36,6 +45,7 @@ class Replayer:
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         if family == socket.AF_INET:
             self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
+            self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(interface))
         self._socket.connect(found)
         self._message = 0
         self._newest = 0.0

@@ -1,7 +1,9 @@
 """ASTERIX CAT240 (radar video, edition 1.3): reading datagrams, the clear way.
 
-Source: EUROCONTROL-SPEC-0149-240 edition 1.3 as transcribed in asterix-specs `cat240/cat-1.3.ast`. Edition 1.2 is read
-alike: no item that occurs in video differs between the two. `cat240_batch` reads the common case much faster.
+Source: EUROCONTROL-SPEC-0149-240 edition 1.3 as transcribed in asterix-specs `cat240/cat-1.3.ast`. Edition 1.2 is
+read by the same rules; that has not been verified, neither against its text nor against a recording. The setting
+`udp.edition` of a radar therefore changes nothing in the reading: it notes what was agreed with the radar, since it is
+not on the wire. `cat240_batch` reads the common case much faster.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 import socket
 import struct
+import sys
 import zipfile
 from collections import Counter
 from pathlib import Path
@@ -364,11 +365,10 @@ def test_damaged_files_give_blocks_or_one_clear_error(
 class Once:
     """A receiver that keeps what it is given."""
 
-    def __init__(self, video: VideoFormat) -> None:
+    def __init__(self, video: VideoFormat, udp: UdpSettings | None = None) -> None:
         self.blocks: list[Sweeps] = []
-        radar = RadarSettings(
-            id="smr", latitude=0, longitude=0, blocks_per_scan=8, udp=UdpSettings(address="127.0.0.1", port=0)
-        )
+        udp = udp or UdpSettings(address="127.0.0.1", port=0)
+        radar = RadarSettings(id="smr", latitude=0, longitude=0, blocks_per_scan=8, udp=udp)
         self.receiver = VideoReceiver(RadarSite("smr", 0, 0, 0, video), 0, radar, self.blocks.append)
 
 
@@ -388,6 +388,24 @@ def test_a_recording_is_replayed_to_a_receiver(tmp_path: Path) -> None:
     assert np.array_equal(np.concatenate([one.amplitude for one in once.blocks]), VIDEO.reshape(-1, RANGES))
     times = np.concatenate([one.time for one in once.blocks])
     assert times[-1] - times[0] == pytest.approx(TURNS - 1 / AZIMUTHS, abs=0.02)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="multicast over loopback as Linux does it")
+def test_a_recording_is_replayed_to_a_group_by_the_interface_of_the_radar(tmp_path: Path) -> None:
+    path = tmp_path / "turns.npz"
+    np.savez(path, scans=VIDEO, t=T0 + np.arange(TURNS) * 1.0, range_step_m=3.0, first_range_m=30.0)
+    recording = open_recording(path)
+    group = UdpSettings(address="0.0.0.0", port=0, group="239.255.82.41", interface="127.0.0.1")
+    once = Once(recording.site.video, group)
+    once.receiver.start()
+    try:
+        address = ("239.255.82.41", once.receiver.port)
+        Replayer(recording, address, speed=20, interface="127.0.0.1").run(lambda _: None)
+        until(lambda: once.receiver.counters()["sweeps"] == TURNS * AZIMUTHS)
+    finally:
+        once.receiver.stop()
+    with pytest.raises(OSError):
+        Replayer(recording, address, interface="nowhere")
 
 
 def test_replayed_datagrams_fit_the_grid_they_come_from() -> None:

@@ -24,6 +24,7 @@ from app.demo.pcap import PcapWriter
 from app.demo.scene import demo_world
 from app.demo.sender import DatagramSender
 from app.demo.traffic import SHIPPED, load_recording, prepare
+from app.ingest.recordings import open_recording
 from app.settings import Settings, SettingsError, load
 from pipeline.airport.model import Airport
 from pipeline.asterix.cat240 import VideoMessage, decode
@@ -214,6 +215,9 @@ def test_video_command_records_scans_with_the_truth(tmp_path: Path) -> None:
     made = np.load(output)
     assert made["scans"].shape == (1, 4096, 1024)
     assert made["t"].tolist() == [1_700_000_000.0]
+    # what is read back has the cells of the radar that was simulated, not of a usual one
+    assert open_recording(output).site.video.range_step_m == pytest.approx(float(made["range_step_m"]))
+    assert float(made["range_step_m"]) == pytest.approx(3.3)
     truth = list(csv.DictReader((tmp_path / "video.truth.csv").open()))
     assert len(truth) > 20
     bad = CliRunner().invoke(command_line, ["simulate", "video", "--output", str(tmp_path / "x.mp4")])

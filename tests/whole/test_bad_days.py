@@ -82,7 +82,10 @@ def test_wrong_settings_stop_the_start_with_the_right_word(tmp_path: Path) -> No
     settings = tmp_path / "airside.toml"
     settings.write_text('[parts]\ndetect = "hybird"\n')
     running = launch("serve", tmp_path / "data", "--settings", str(settings))
-    assert running.process.wait(60) != 0
+    try:
+        assert running.process.wait(60) != 0
+    finally:
+        running.end(signal.SIGKILL)
     assert "hybrid" in running.output.read_text()
 
 
@@ -92,5 +95,8 @@ def test_a_taken_port_is_said(tmp_path: Path) -> None:
         holder.listen()
         port = holder.getsockname()[1]
         running = launch("serve", tmp_path / "data", AIRSIDE_PORT=str(port), AIRSIDE_VIEW3D="false")
-        assert running.process.wait(60) != 0
+        try:
+            assert running.process.wait(60) != 0
+        finally:
+            running.end(signal.SIGKILL)
     assert str(port) in running.output.read_text()
