@@ -26,7 +26,8 @@ class Replayer:
     The first sweep is sent as of now; the times of day go on as in the recording, so that `speed` times the pace gives
     `speed` times the clock, and speeds of targets stay true.
 
-    interface: address of the interface by which a multicast group is sent to; 0.0.0.0 leaves it to the system. Raises OSError where the socket does, or when `interface` is no address.
+    interface: address of the interface by which a multicast group is sent to; 0.0.0.0 leaves it to the system.
+    Raises OSError where the socket does, or when `interface` is no address.
     """
 
     def __init__(
