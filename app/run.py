@@ -69,6 +69,7 @@ class Running:
             self.view3d.start()
             self._ends.callback(self.view3d.stop)
             view = self.view3d
+            service.extra_counters["view3d"] = lambda: {f"view3d_{k}": v for k, v in view.counters().items()}
             service.listen(lambda picture, _changes: view.update(picture))
         try:
             bus = connect_bus(self.settings.bus_url, service)

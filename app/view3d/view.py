@@ -6,6 +6,7 @@ import contextlib
 import logging
 import threading
 import time
+import warnings
 from collections import Counter
 from collections.abc import Iterator
 from typing import Any
@@ -87,8 +88,8 @@ class View3D:
             self._thread.join(15.0)
 
     def counters(self) -> dict[str, int]:
-        """What was taken, merged (overtaken before it was shown), shown, refused for want of places, and failed."""
-        return {**self._counts, "viewers": len(self._viewers), "without_place": self._movers.slots.refused}
+        """What was taken, merged (overtaken before it was shown), shown, failed, left without a place; they grow."""
+        return dict(self._counts)
 
     def count(self, what: str) -> None:
         """Count something that happened at the door."""
@@ -147,8 +148,10 @@ class View3D:
             try:
                 if picture is not None:
                     frame = self._movers.arrange(picture)
+                    self._counts["without_place"] += self._movers.slots.refused
                     scene.show(frame)
                     self._counts["shown"] += 1
+                self._forget_the_gone()
                 if frame is not None:
                     for viewer in self.viewers():
                         self._refresh(viewer, frame)
@@ -163,7 +166,7 @@ class View3D:
                     log.exception("3D view: a picture could not be shown (%d so far)", self._counts["failed"])
             wait = self._period_s if self._viewers else IDLE_S
             earliest = begun + URGENT_S
-            time.sleep(max(0.0, earliest - time.monotonic())) if not self._over.is_set() else None
+            self._over.wait(max(0.0, earliest - time.monotonic()))
             due = begun + wait
 
     def _refresh(self, viewer: Any, frame: Frame) -> None:
@@ -186,6 +189,13 @@ class View3D:
     def _disconnected(self, client: Any) -> None:
         with self._lock:
             self._viewers.pop(client.client_id, None)
+
+    def _forget_the_gone(self) -> None:
+        """A client that left while it was being greeted has said goodbye before it was known."""
+        here = self._server.get_clients()
+        with self._lock:
+            for gone in [one for one in self._viewers if one not in here]:
+                del self._viewers[gone]
 
     def _picked(self, client: int, place: int | None) -> None:
         with self._lock:
@@ -220,6 +230,8 @@ def _server(host: str, port: int) -> Any:
     import viser
     from viser import _client_autobuild, _messages
 
+    # A client may leave between two lines that write to it; that is no news.
+    warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
     # viser would run npm when the times of its files look odd, as they do in images and copied environments.
     _client_autobuild.ensure_client_is_built = lambda: None
     server = viser.ViserServer(host=host, port=port, verbose=False)
