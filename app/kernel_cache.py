@@ -1,8 +1,8 @@
 """Where compiled kernels are kept.
 
-numba's own cache looks only at the file a kernel stands in, not at the kernels of other files that were compiled into it,
-so an update of one file could leave old code at work. Here the folder is named after all files that hold kernels: one
-changed, all are compiled anew, once.
+numba's own cache looks only at the file a kernel stands in, not at the kernels of other files that were compiled into
+it, so an update of one file could leave old code at work. Here the folder is named after all files that hold kernels:
+one changed, all are compiled anew, once.
 """
 
 from __future__ import annotations
