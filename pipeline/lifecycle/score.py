@@ -27,7 +27,7 @@ class Score(Fading):
 
     confirm: float = 12.0
     drop: float = -5.0
-    keep: float = 0.0
+    keep: float = 4.0
     least_hits: int = 3
     longest: int = 14
 

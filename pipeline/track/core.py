@@ -51,7 +51,8 @@ class TrackerSettings:
     which two tracks of one target become one. detection: probability that a look of a radar finds a target.
     false_on_pavement, false_elsewhere: false plots a m^2 and turn, at least; elsewhere more is learnt. cell_scores:
     what a plot of one, two, ... cells adds to the score of a track, the last for all larger ones. other_sensor: what
-    a node event or a report adds. most_score: it grows no further. aircraft_length: what is longer is reported off
+    a node event or a report adds. most_score: it grows no further, that of young
+    tracks not as far. aircraft_length: what is longer is reported off
     the pavement and starts tracks on buildings. apron_speed_sd: m/s of each component of the speed of what begins on
     an apron.
     """

@@ -192,7 +192,9 @@ def _score(
     # what lies anywhere within an extended track has no distance of its own
     away = np.where(np.isfinite(squared[hit]), squared[hit], 2.0)
     gained = np.log(settings.detection / (volume * false)) - 0.5 * away + cells
-    table.score[rows] = np.minimum(table.score[rows] + gained, settings.most_score)
+    # what was seen for long may be lost for long
+    most = settings.most_score - np.maximum(20 - table.hits[rows], 0) * 0.4
+    table.score[rows] = np.minimum(table.score[rows] + gained, np.maximum(most, table.score[rows]))
 
 
 def owners(

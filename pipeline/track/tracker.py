@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.airport.model import Airport
+from pipeline.airport.model import Airport, SurfaceKind
 from pipeline.sites import NodeSite, RadarSite
 from pipeline.tables import NodeEvents, Plots, SectorPlots, TargetReports, TrackPhase, Tracks
 from pipeline.track.contracts import Array, AssociatePart, ClassifyPart, FilterPart, LifecyclePart
@@ -122,12 +122,14 @@ class Tracker:
 
     def _worth_reporting(self, rows: Array, state: Array) -> Array:
         core, table = self._core, self._core.table
+        kind = core.zones.kind(state[:, 0], state[:, 1])
+        known = (table.address[rows] != "") | (table.node_time[rows] > NEVER) | (table.report_time[rows] > NEVER)
+        # what a radar has lost did not go on through a building
+        lost = ~known & (table.phase[rows] == TrackPhase.COASTING) & (kind == SurfaceKind.BUILDING)
         if core.settings.report_fixed_off_pavement:
-            return np.ones(len(rows), np.bool_)
-        known = table.moved[rows] | (table.address[rows] != "") | (table.node_time[rows] > NEVER)
-        known |= table.report_time[rows] > NEVER
-        known |= (table.length[rows] >= core.settings.aircraft_length) & (table.shapes[rows] >= SETTLED)
-        return np.asarray(known | PAVED[core.zones.kind(state[:, 0], state[:, 1])])
+            return np.asarray(~lost)
+        large = (table.length[rows] >= core.settings.aircraft_length) & (table.shapes[rows] >= SETTLED)
+        return np.asarray((known | table.moved[rows] | large | PAVED[kind]) & ~lost)
 
     def save(self) -> dict[str, Any]:
         """The whole state, as copies of arrays and plain values, for `restore` of a tracker of the same make."""

@@ -17,8 +17,8 @@ from pipeline.tables import Tracks
 
 @cache
 def score() -> Score:
-    """52 turns, the last 27 counted: the first incident, at 45 s, is in them."""
-    return demo_quality(52, settle=25.0)
+    """56 turns, the last 26 counted: the first incident, at 45 s, is in them."""
+    return demo_quality(56, settle=30.0)
 
 
 def figures() -> dict[str, QualityRow]:
@@ -35,13 +35,15 @@ def figures() -> dict[str, QualityRow]:
         "velocity, 90 %",
         "course of what moves, 90 %",
         "heading of moving aircraft, 90 %",
-        "turning of standing aircraft, 99 %",
         "gap of 3 to 5 s",
         "gap of more than 5 s",
         "false target report",
         "false tracks a minute",
         "of these on the pavement",
         "false identification",
+        "identification",
+        "alert after passing the hold, latest",
+        "incidents without an alert",
     ],
 )
 def test_the_demonstration_keeps_the_bound(name: str) -> None:
@@ -51,11 +53,11 @@ def test_the_demonstration_keeps_the_bound(name: str) -> None:
 
 def test_enough_was_scored_to_mean_something() -> None:
     made = score()
-    assert made.seconds == 27
+    assert made.seconds == 26
     assert made.asked["manoeuvring"] > 200
     assert made.asked["apron"] > 300
     assert len(made.course) > 100
-    assert made.should_be_named > 300
+    assert made.should_be_named > 200
 
 
 def tracks_of(world: World, time: float, shift: float = 0.0, keep: slice = slice(None)) -> Tracks:

@@ -114,7 +114,7 @@ class LifecycleContract:
     def judge(self, **given: Any) -> tuple[int, bool]:
         row: dict[str, Any] = {
             "phase": 0, "history": 1, "looks": 1, "misses": 0, "silence": 0.0, "identified": False, "position_sd": 3.0,
-            "score": 1.0,
+            "score": 9.0,
         } | given  # fmt: skip
         kinds = {"phase": "u1", "history": "u4", "looks": "i4", "misses": "i4", "identified": "?"}
         phase, ended = self.part.judge(**{k: np.array([v], dtype=kinds.get(k, "f8")) for k, v in row.items()})

@@ -83,3 +83,13 @@ def test_a_car_on_grass_is_reported() -> None:
 def test_what_is_as_long_as_an_aircraft_is_reported_wherever_it_stands() -> None:
     beside, roof = Target(line(500, 300, 0, 0), 30, 25), Target(line(1000, 1000, 0, 0), 30, 25)
     assert len(run(make_tracker(zones=GRASS), [beside, roof], 12).tracks()) == 2
+
+
+def test_a_lost_track_is_not_shown_driving_through_a_building() -> None:
+    """It is last seen 30 m before the walls (950 m east) and would go on into them."""
+    target = Target(line(800, 1000, 12, 0), 6, 3, gone=10.0)
+    tracker = run(make_tracker(), [target], 10)
+    assert len(tracker.tracks()) == 1
+    run(tracker, [target], 4, first=10)
+    assert len(tracker.tracks()) == 0
+    assert tracker.save()["table"]["id"].tolist() == [1]

@@ -53,9 +53,9 @@ class TestScoreContract(LifecycleContract):
 
     def test_what_is_confirmed_needs_less(self) -> None:
         confirmed = {"phase": TrackPhase.CONFIRMED, "looks": 40}
-        assert self.judge(**confirmed, score=1.0) == (TrackPhase.CONFIRMED, False)
-        assert self.judge(**confirmed, score=-1.0)[1]
-        assert not self.judge(**confirmed, score=-1.0, identified=True)[1]
+        assert self.judge(**confirmed, score=5.0) == (TrackPhase.CONFIRMED, False)
+        assert self.judge(**confirmed, score=3.0)[1]
+        assert not self.judge(**confirmed, score=3.0, identified=True)[1]
 
 
 class TestExtentSpeedContract(ClassifyContract):
