@@ -14,6 +14,7 @@ from starlette.responses import Response
 from app.api import models
 from app.api.context import Context, answer, problems
 from app.api.problems import ApiProblem
+from app.ingest import octets
 from app.ingest.node_events import NodeEventRow, parse_node_events
 from app.ingest.target_reports import TargetReportRow, parse_target_reports
 
@@ -31,10 +32,10 @@ def intake_router(context: Context) -> APIRouter:
         "/radars/{id}/sweeps",
         response_model=models.Counted,
         responses=failures,
+        description=octets.__doc__,
         openapi_extra={"requestBody": {"required": True, "content": {OCTETS: {"schema": {"type": "string"}}}}},
     )
     async def sweeps(id: Annotated[str, Path(max_length=32)], request: Request) -> Response:
-        """Sweeps of a radar as octets: the header and layout are described in `app/ingest/octets.py` and the README."""
         body = await _body(request, OCTETS)
         counted = await run_in_threadpool(context.ask, lambda: service.submit_sweeps(id, body), 422)
         return answer(counted)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import httpx
 import pytest
 import schemathesis
 from hypothesis import HealthCheck, Phase, given, settings
@@ -55,3 +56,15 @@ def test_the_service_keeps_to_its_document(server: Server, mode: GenerationMode)
         run()
     assert "POST /api/v1/alerts/{id}/acknowledge" in tried
     assert "PUT /api/v1/runways/{id}/state" in tried
+
+
+def test_the_octets_of_posted_sweeps_are_described_where_a_client_looks(server: Server) -> None:
+    document = httpx.get(f"{server.url}/openapi.json", timeout=10).json()
+    told = document["paths"]["/api/v1/radars/{id}/sweeps"]["post"]["description"]
+    assert all(word in told for word in ("ASWP", "little-endian", "48 + n * (16 + cells)"))
+
+
+def test_the_resume_place_is_described_as_the_feed_takes_it(server: Server) -> None:
+    document = httpx.get(f"{server.url}/asyncapi.json", timeout=10).json()
+    assert "`resume`" in document["info"]["description"]
+    assert set(document["components"]["schemas"]["ResumePlace"]["properties"]) == {"epoch", "seq"}
