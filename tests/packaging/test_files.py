@@ -59,6 +59,15 @@ def test_the_check_script_is_sound_bash() -> None:
     assert subprocess.run(["bash", "-n", str(ROOT / ".ci" / "run")], check=False).returncode == 0
 
 
+def test_what_the_readme_points_to_is_there() -> None:
+    text = (ROOT / "README.md").read_text()
+    pictures = re.findall(r"!\[[^]]+\]\(([^)]+)\)", text)
+    assert len(pictures) == 2
+    assert [one for one in pictures if not (ROOT / one).is_file()] == []
+    given = set(re.findall(r"\b(AIRSIDE_[A-Z0-9_]+)=", text)) - {"AIRSIDE_SETTINGS"}
+    assert [one for one in given if not a_setting(one)] == []
+
+
 @pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
 def test_make_alone_tells_what_there_is() -> None:
     told = subprocess.run(["make", "-C", str(ROOT)], capture_output=True, text=True, check=True).stdout
