@@ -87,6 +87,10 @@ def plan_looks(
     return made
 
 
+MOST_GUARD = 0.25
+"""Radians to both sides that a look waits for at most: a loose track near the radar is not worth a long delay."""
+
+
 @njit(nogil=True, cache=True)
 def _plan(
     radar: Floats, closed_to: int, time: Floats, state: Floats, cov: Floats, extent: Floats, looked: Array,
@@ -117,7 +121,7 @@ def _plan(
         spread = p[0, 0] + p[1, 1] + 2 * dt * (p[0, 2] + p[1, 3]) + dt * dt * (p[2, 2] + p[3, 3])
         spread += 4.0 * abs(dt) ** 3 + (distance * beamwidth) ** 2 + step * step + 0.1 * extent[i, 0] ** 2
         reach = min(math.sqrt(gate * max(spread, 0.0)), max_gate) + 0.5 * extent[i, 0] + 2.0 * step
-        guard[i] = min(reach / max(distance, 1.0), 0.5 * math.pi) / TWO_PI * azimuths + 1.0
+        guard[i] = min(reach / max(distance, 1.0), MOST_GUARD) / TWO_PI * azimuths + 1.0
         # a scan left out is one look, not as many as turns went by
         late = int((closed_to - guard[i] - r) // azimuths)
         if late > 0:
