@@ -172,7 +172,8 @@ def take(core: Core, rows: Array, time: Floats, position: Floats, noise: Floats,
     heard = getattr(table, SOURCE_TIMES[source])
     heard[rows] = np.maximum(heard[rows], time)
     way = np.hypot(*(table.state[rows, :2] - table.birthplace[rows]).T)
-    table.moved[rows] |= way > core.settings.moved_by + 0.5 * np.nan_to_num(table.length[rows])
+    size = np.fmax(np.nan_to_num(table.length[rows]), 2.0 * table.body[rows])
+    table.moved[rows] |= way > core.settings.moved_by + 0.5 * size
 
 
 def start(

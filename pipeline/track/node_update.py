@@ -102,6 +102,7 @@ def _begin(core: Core, events: NodeEvents, event: int, time: float, lane: Floats
         head_start=2 if knows_speed else 0,
     )  # fmt: skip
     core.count("node_started", made.stop - made.start)
+    core.count("node_without_track", int(made.stop == made.start))
     if knows_speed and made.stop > made.start:
         row = made.start
         # a lane is driven both ways: the speed is known, its sense is not

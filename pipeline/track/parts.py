@@ -36,7 +36,8 @@ def join_parts(core: Core) -> None:
     on_apron = (kind != SurfaceKind.RUNWAY) & (kind != SurfaceKind.TAXIWAY)
     still = on_apron & ~table.moved[alive] & ~named
     size = core.extents(alive)
-    rank = 1e6 * named + 1e3 * aircraft + size[:, 0]
+    # not by extent, which changes with every turn; among equals the older goes on
+    rank = 4.0 * named + 2.0 * aircraft + 1.0 * (table.body[alive] > 0)
     whole = np.full(len(alive), -1, np.int64)
     order = np.argsort(state[:, 0], kind="stable")
     seen = np.fmax(np.nan_to_num(table.length[alive]), np.nan_to_num(table.width[alive]))
@@ -48,7 +49,8 @@ def join_parts(core: Core) -> None:
     for junior in np.flatnonzero(table.part[alive] > core.settings.merge_after):
         senior = alive[whole[junior]]
         if not gone[senior] and not gone[alive[junior]]:
-            _cover(core, int(senior), int(alive[junior]), state[whole[junior]], state[junior])
+            hopped = bool(on_apron[whole[junior]] and not named[whole[junior]])
+            _cover(core, int(senior), int(alive[junior]), state[whole[junior]], state[junior], hopped)
             body = table.body[senior]
             absorb(core, int(senior), int(alive[junior]))
             table.body[senior] = body
@@ -57,8 +59,11 @@ def join_parts(core: Core) -> None:
     end(core, gone)
 
 
-def _cover(core: Core, whole: int, part: int, here: Floats, there: Floats) -> None:
-    """The extent of `whole` grows over `part`; what stands moves to the middle of both."""
+def _cover(core: Core, whole: int, part: int, here: Floats, there: Floats, hopped: bool) -> None:
+    """The extent of `whole` grows over `part`; what stands moves to the middle of both.
+
+    hopped: it has no motion but that from part to part, so it has no heading.
+    """
     table = core.table
     away = there[:2] - here[:2]
     distance = float(np.hypot(away[0], away[1]))
@@ -73,7 +78,7 @@ def _cover(core: Core, whole: int, part: int, here: Floats, there: Floats) -> No
     grown = []
     for own_side, other, apart in ((own[0, 0], own[1, 0], along), (own[0, 1], own[1, 1], across)):
         grown.append(min(max(own_side, own_side / 2 + apart + other / 2), LONGEST))
-    if not table.moving[whole] and table.address[whole] == "":
+    if hopped:
         # halfway by how far the extent grew, so that the far edges of both stay where they are
         share = (
             0.5 * (grown[0] - own[0, 0]) / max(along, 1.0)
@@ -83,6 +88,10 @@ def _cover(core: Core, whole: int, part: int, here: Floats, there: Floats) -> No
         table.state[whole, :2] += min(share, 1.0) * away
         table.covariance[whole, 0, 0] += (0.1 * distance) ** 2
         table.covariance[whole, 1, 1] += (0.1 * distance) ** 2
+    if hopped:
+        table.moved[whole] = table.moving[whole] = False
+        table.heading[whole] = np.nan
+        table.birthplace[whole] = table.state[whole, :2]
     table.length[whole], table.width[whole] = grown
     table.body[whole] = max(BODY, 0.5 * max(grown))
     table.shapes[whole] = max(int(table.shapes[whole]), 1)
@@ -138,5 +147,5 @@ def _parts(
             slack = 4.0 if apron[i] and apron[j] else 1.0
             if faster > 5.0 * (loose + slack):
                 continue
-            if whole[j] < 0 or rank[i] > rank[whole[j]]:
+            if whole[j] < 0 or (rank[i], -i) > (rank[whole[j]], -whole[j]):
                 whole[j] = i

@@ -297,3 +297,11 @@ def test_an_event_of_an_unknown_kind_and_no_speed_is_a_passage() -> None:
     tracker = run(make_tracker([NODE]), [TAXI], 10)
     tracker.node_events(event(10.0).replace(kind=9, speed=-5.0))
     assert tracker.counters["node_pulled"] == 1
+
+
+def test_an_event_for_which_there_is_neither_track_nor_room_is_counted() -> None:
+    tracker = make_tracker([NODE], capacity=1)
+    run(tracker, [Target(line(-700, -300, 0, 5), 12, 4)], 8)
+    tracker.node_events(event(8.0))
+    assert tracker.counters["node_without_track"] == 1
+    assert "node_started" not in tracker.counters
