@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import signal
+import socket
 import threading
 import time
 from collections.abc import Callable
@@ -105,6 +106,7 @@ class Running:
 def serve(settings: Settings, console: Console) -> int:
     """Run until SIGINT or SIGTERM; the exit status."""
     _log_to(console, settings.log_level)
+    listening = _listen(settings)
     running = Running(settings)
     config = uvicorn.Config(
         running.app,
@@ -124,7 +126,7 @@ def serve(settings: Settings, console: Console) -> int:
 
     def start() -> None:
         try:
-            _begin_aloud(running, console, server)
+            _begin_aloud(running, console, server, listening.getsockname()[1])
         except BaseException as error:
             failed.append(error)
             log.error("start-up failed: %s", error, exc_info=settings.log_level == "debug")
@@ -136,14 +138,14 @@ def serve(settings: Settings, console: Console) -> int:
     starter = threading.Thread(target=start, name="start-up")
     starter.start()
     try:
-        server.run()
+        server.run(sockets=[listening])
     finally:
         starter.join()
         running.end()
     return 1 if failed or not server.started else 0
 
 
-def _begin_aloud(running: Running, console: Console, server: uvicorn.Server) -> None:
+def _begin_aloud(running: Running, console: Console, server: uvicorn.Server, port: int) -> None:
     begun = time.monotonic()
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=not console.is_terminal) as progress:
@@ -165,12 +167,22 @@ def _begin_aloud(running: Running, console: Console, server: uvicorn.Server) -> 
         return
     settings = running.settings
     host = "127.0.0.1" if settings.host in ("0.0.0.0", "::") else settings.host
-    port = server.servers[0].sockets[0].getsockname()[1] if server.started and server.servers else settings.port
     console.print(
         f"\n[bold]Airside[/bold] {running.service.airport.icao} is ready after {time.monotonic() - begun:.1f} s:"
         f" [bold cyan]http://{host}:{port}[/bold cyan]   (Ctrl-C ends it)\n",
         highlight=False,
     )
+
+
+def _listen(settings: Settings) -> socket.socket:
+    """The listening socket; connections inherit its small send buffer, by which a client that does not read shows."""
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    try:
+        opened = socket.create_server((settings.host, settings.port), family=family, backlog=2048)
+    except OSError as error:
+        raise SettingsError(f"cannot listen on {settings.host}:{settings.port}: {error.strerror}") from error
+    opened.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 65536)
+    return opened
 
 
 def _log_to(console: Console, level: str) -> None:

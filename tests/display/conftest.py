@@ -22,7 +22,7 @@ def serving() -> Iterator[Serving]:
     made.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # not for the session: its event loop would be in the way of other tests' loops
 def browser() -> Iterator[Any]:
     path = CHROMIUM or shutil.which("chromium") or shutil.which("google-chrome")
     if path is None:

@@ -6,7 +6,6 @@ import random
 import signal
 import socket
 import sqlite3
-import time
 from pathlib import Path
 
 from tests.whole.conftest import Airside, free_port, launch
@@ -30,11 +29,21 @@ def test_hostile_datagrams_are_counted_and_the_picture_goes_on(demo: Airside) ->
     assert demo.get("/health/ready").status_code == 200
 
 
+def stored(running: Airside) -> None:
+    """Wait until some track points have been committed."""
+
+    def points() -> int:
+        sensors = running.get("/api/v1/sensors").json()["sensors"]
+        return int(next(one for one in sensors if one["kind"] == "store")["counters"]["points"])
+
+    eventually(points, 60, "track points in the database")
+
+
 def test_sigterm_in_mid_scan_drains_and_ends_well(tmp_path: Path) -> None:
     running = launch("demo", tmp_path / "data")
     try:
         running.wait_ready()
-        time.sleep(4)
+        stored(running)
         assert running.end() == 0, running.output.read_text()
     finally:
         running.end(signal.SIGKILL)
@@ -46,7 +55,7 @@ def test_after_kill_9_the_database_opens_and_the_next_start_is_quick(tmp_path: P
     running = launch("demo", tmp_path / "data")
     try:
         running.wait_ready()
-        time.sleep(4)
+        stored(running)
     finally:
         running.end(signal.SIGKILL)
     with sqlite3.connect(tmp_path / "data" / "airside.sqlite3") as database:
