@@ -16,21 +16,31 @@ START = 1_700_000_000.0
 
 
 def demo_quality(
-    scans: int, progress: Callable[[int], None] | None = None, settings: Settings | None = None, settle: float = 30.0
+    scans: int,
+    progress: Callable[[int], None] | None = None,
+    settings: Settings | None = None,
+    settle: float = 30.0,
+    seed: int | None = None,
 ) -> Score:
-    """Run `scans` turns of the demonstration; the same every time. settle: s at the start that are not counted."""
-    settings = demo_settings(settings or Settings())
+    """Run `scans` turns of the demonstration; the same every time.
+
+    settle: s at the start that are not counted. seed: instead of the one in the settings.
+    """
+    settings = settings or Settings()
+    if seed is not None:
+        settings = settings.model_copy(update={"demo": settings.demo.model_copy(update={"seed": seed})})
+    settings = demo_settings(settings)
     world = demo_world(settings, START)
     site = radar_site(settings.radars[0], world.airport)
     nodes = tuple(node_site(one, world.airport) for one in settings.nodes)
-    seed = settings.demo.seed
+    chosen = settings.demo.seed
     return picture_quality(
         world,
         radar_chain(site, 0, settings, world.airport),
         surface_engine(settings, world.airport, (site,), nodes),
-        VideoSimulator(world.airport, site, seed, start=START),
-        NodeSimulator(nodes, seed),
-        ReportSimulator(seed),
+        VideoSimulator(world.airport, site, chosen, start=START),
+        NodeSimulator(nodes, chosen),
+        ReportSimulator(chosen),
         scans,
         settle,
         progress,

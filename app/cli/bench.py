@@ -84,6 +84,7 @@ def _tracker(peers: bool) -> tuple[str, ...]:
 
 def picture(
     scans: Annotated[int, typer.Option(min=40, help="Turns of the radar to run; the first 30 are not counted.")] = 300,
+    seed: Annotated[int, typer.Option(min=0, help="Of the simulated world and its radar video.")] = 1,
 ) -> None:
     """Run the demonstration's world through radar chain and tracker and compare the picture with the truth.
 
@@ -96,14 +97,14 @@ def picture(
 
     with Progress(transient=True) as progress:
         task = progress.add_task("Turns of the radar", total=scans)
-        score = demo_quality(scans, lambda scan: progress.update(task, completed=scan + 1))
-    Console().print(_quality(score, scans))
+        score = demo_quality(scans, lambda scan: progress.update(task, completed=scan + 1), seed=seed)
+    Console().print(_quality(score, f"Picture against truth, {scans} turns, seed {seed}"))
 
 
-def _quality(score: Score, scans: int) -> Table:
+def _quality(score: Score, title: str) -> Table:
     from rich.table import Table
 
-    table = Table(title=f"Picture against truth, {scans} turns", title_justify="left")
+    table = Table(title=title, title_justify="left")
     for name, side in (("figure", "left"), ("measured", "right"), ("wanted", "right"), ("", "left"), ("", "left")):
         table.add_column(name, justify="right" if side == "right" else "left", no_wrap=side == "right")
     for row in score.rows():

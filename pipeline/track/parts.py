@@ -15,6 +15,9 @@ from pipeline.track.core import Core, end
 BODY = 21.0
 """Half the length, and half the span, of an aircraft of unknown size, and how far off its centre may be; metres."""
 
+FAST = 20.0
+"""m/s, above which nothing else moves within the body of an aircraft."""
+
 LONGEST = 75.0
 """No aircraft is longer; metres."""
 
@@ -46,7 +49,9 @@ def join_parts(core: Core) -> None:
     )
     table.part[alive] = np.where(whole >= 0, table.part[alive] + 1, 0)
     gone = np.zeros(n, np.bool_)
-    for junior in np.flatnonzero(table.part[alive] > core.settings.merge_after):
+    fast = np.hypot(state[whole, 2], state[whole, 3]) > FAST
+    patience = np.where(fast, 0, core.settings.merge_after)
+    for junior in np.flatnonzero((whole >= 0) & (table.part[alive] > patience)):
         senior = alive[whole[junior]]
         if not gone[senior] and not gone[alive[junior]]:
             hopped = bool(on_apron[whole[junior]] and not named[whole[junior]])
@@ -145,6 +150,10 @@ def _parts(
             loose = cov[i, 2, 2] + cov[i, 3, 3] + cov[j, 2, 2] + cov[j, 3, 3]
             # on the apron a track that hops from part to part seems to move
             slack = 4.0 if apron[i] and apron[j] else 1.0
+            pace = state[i, 2] ** 2 + state[i, 3] ** 2
+            # two of them cannot fly or roll so close; new tracks have wild speeds
+            if pace > FAST**2:
+                slack += 0.02 * pace
             if faster > 5.0 * (loose + slack):
                 continue
             if whole[j] < 0 or (rank[i], -i) > (rank[whole[j]], -whole[j]):

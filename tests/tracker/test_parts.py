@@ -62,3 +62,19 @@ def test_two_aircraft_side_by_side_stay_two() -> None:
 def test_a_car_that_passes_behind_a_standing_aircraft_stays_itself() -> None:
     aircraft, car = Target(line(400, 300, 0, 0), 36, 30), Target(line(300, 272, 6, 0), 5, 2, 0.95)
     assert len(feed(make_tracker(zones=APRON), [aircraft, car], 30)) == 2
+
+
+def test_a_second_track_on_a_landing_aircraft_is_soon_gone() -> None:
+    """Its reports lag 35 m behind for a while, so that the radar's plots begin a track of their own."""
+    target = Target(line(-2500, 200, 72, 0), 38, 30)
+    tracker, counts = make_tracker(), []
+    for scan in range(30):
+        late = 35.0 if scan < 12 else 0.0
+        at = {"time": T0 + scan + 0.01, "address": "3944e0", "callsign": "TVF19YP", "category": 1, "on_ground": False}
+        place = {"east": -2500 + 72 * (scan + 0.01) - late, "north": 200.0, "speed": 72.0, "course": np.pi / 2}
+        tracker.target_reports(TargetReports.build(1, **at, **place, altitude=20.0))
+        for sector in split_scan(scan_plots(np.random.default_rng((4, scan)), [target], scan), scan, 8):
+            tracker.sector(sector)
+        counts.append(len(tracker.tracks()))
+    assert max(counts[16:]) == 1
+    assert tracker.tracks().callsign.tolist() == ["TVF19YP"]
