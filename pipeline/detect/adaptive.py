@@ -18,15 +18,14 @@ where a macro-cell is homogeneous and its clutter Rayleigh. The threshold of a c
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter, minimum_filter
 
-from pipeline.detect.calibration import LOG_MEAN_DB, estimation_loss_db, threshold_offset_db
+from pipeline.detect.calibration import estimation_loss_db, threshold_offset_db, truncated_rayleigh_db
+from pipeline.detect.patches import BUILDING, EDGE, GRASS, Patches
 from pipeline.kernels.bits import bits_above, count_runs
 from pipeline.kernels.run_cap import CapSettings, fit_row
 from pipeline.state import ArrayState, read_only, remembered
@@ -34,15 +33,6 @@ from pipeline.tables import Detections, Sweeps, VideoFormat
 
 ONE = 128
 """Units of an offset in one step of the log amplitude."""
-
-EDGE = 8
-"""Added to the surface kind of a cell beside a border."""
-
-FEWEST = 150
-"""A patch with fewer cells is put together with the same kind in a larger macro-cell."""
-
-GRASS, BUILDING = 0, 4
-"""Surface kinds with bounds of their own; see `pipeline.airport.model.SurfaceKind`."""
 
 LEARN_EVERY = 6
 """Once the start is over, a row learns in every sixth scan: its offsets then remember for minutes."""
@@ -135,14 +125,13 @@ class Adaptive:
             surface = np.full(shape, 2, np.uint8)
         if surface.shape != shape:
             raise ValueError(f"surface must be {shape}, not {surface.shape}")
-        patch, kind, macro = _patches(video, surface, self.macro_cell_m)
-        run_at, runs = _runs(patch)
+        patches = Patches.build(video, surface, self.macro_cell_m)
+        kind, many = patches.kind, len(patches.kind)
         step = video.db_per_step
         offset_db = threshold_offset_db(self.pfa, step)
         gain = 1.0 / self.offset_scans
         mu = offset_db + estimation_loss_db(self.pfa, step) * gain / (2 - gain)
-        patches = len(kind)
-        missing_db, spread_db = _truncated_db(offset_db - self.margin_db)
+        missing_db, spread_db = truncated_rayleigh_db(offset_db - self.margin_db)
         rayleigh = spread_db / step
         return AdaptiveState(
             azimuths=video.azimuths,
@@ -157,22 +146,22 @@ class Adaptive:
                 7.0 / step,
                 float(self.learn_scans),
             ),
-            run_at=run_at,
-            runs=runs,
-            macro=macro,
+            run_at=patches.run_at,
+            runs=patches.runs,
+            macro=patches.macro,
             bounds=self._bounds(kind, step),
             wide=(kind >= EDGE) | (kind == BUILDING),
             soft=(kind >= EDGE) | (kind == BUILDING) | (kind == GRASS),
             tail=np.zeros(64, np.uint8),
             offset=np.zeros(shape, np.int16),
-            level=np.zeros(patches),
-            spread=np.full(patches, rayleigh),
-            bias=np.zeros(patches),
-            base=np.full(patches, 10_000, np.int32),
-            sums=np.zeros((patches, 5)),
-            heard=np.zeros(patches, np.int64),
+            level=np.zeros(many),
+            spread=np.full(many, rayleigh),
+            bias=np.zeros(many),
+            base=np.full(many, 10_000, np.int32),
+            sums=np.zeros((many, 5)),
+            heard=np.zeros(many, np.int64),
             scan=np.array([-1, 0, 0], np.int64),
-            moved=np.zeros(patches, np.int64),
+            moved=np.zeros(many, np.int64),
             stale=np.full(video.azimuths, -1, np.int64),
             limits=np.full((video.azimuths, 64 * video.words), 255, np.uint8),
             budget=np.array([CapSettings.of(self.max_runs, video.azimuths).depth]),
@@ -220,62 +209,6 @@ class Adaptive:
 
 
 PART = Adaptive
-
-
-def _patches(
-    video: VideoFormat, surface: NDArray[np.uint8], size_m: float
-) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.int64]]:
-    """(azimuths, ranges) patch of each cell; kind (EDGE added) and macro-cell of each patch."""
-    least = minimum_filter(surface, size=5, mode=("wrap", "nearest"))
-    border = least != maximum_filter(surface, size=5, mode=("wrap", "nearest"))
-    kind = surface.astype(np.int64) + EDGE * (border & (surface != BUILDING))
-    macro = _macro_cells(video, size_m)
-    patch = np.full(surface.shape, -1, np.int64)
-    sizes = (size_m, 3 * size_m, 10 * size_m, np.inf)
-    for size in sizes:
-        left = patch < 0
-        if not left.any():
-            break
-        key = _macro_cells(video, size)[left] * (2 * EDGE) + kind[left]
-        _, inverse, counts = np.unique(key, return_inverse=True, return_counts=True)
-        good = (counts >= FEWEST)[inverse] if np.isfinite(size) else np.ones(len(inverse), bool)
-        patch[left] = np.where(good, inverse + patch.max() + 1, -1)
-    _, first, named = np.unique(patch, return_index=True, return_inverse=True)
-    _, neighbourhood = np.unique(macro.ravel()[first], return_inverse=True)
-    return named.reshape(surface.shape).astype(np.int32), kind.ravel()[first], neighbourhood
-
-
-def _macro_cells(video: VideoFormat, size_m: float) -> NDArray[np.int64]:
-    """(azimuths, ranges) number of the nearly square macro-cell of each cell."""
-    if not np.isfinite(size_m):
-        return np.zeros((video.azimuths, video.ranges), np.int64)
-    distance = video.first_range_m + np.arange(video.ranges) * video.range_step_m
-    ring = (distance / size_m).astype(np.int64)
-    bands = np.maximum(np.rint(2 * np.pi * (ring + 0.5)), 1).astype(np.int64)
-    turn = np.arange(video.azimuths)[:, None] / video.azimuths
-    return np.asarray(ring * 100_000 + (turn * bands).astype(np.int64))
-
-
-def _runs(patch: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Runs of one patch along each row: first run of each row (rows + 1); first cell, end and patch of each run."""
-    starts = np.ones(patch.shape, bool)
-    starts[:, 1:] = patch[:, 1:] != patch[:, :-1]
-    row, cell = np.nonzero(starts)
-    run_at = np.zeros(len(patch) + 1, np.int64)
-    np.cumsum(np.bincount(row, minlength=len(patch)), out=run_at[1:])
-    end = np.append(cell[1:], 0)
-    end[end == 0] = patch.shape[1]
-    return run_at, np.stack([cell, end, patch[row, cell]], axis=1).astype(np.int32)
-
-
-@lru_cache(maxsize=16)
-def _truncated_db(limit_db: float) -> tuple[float, float]:
-    """How much the mean of log Rayleigh clutter loses when nothing is more than limit_db above it, and what spread is
-    left."""
-    power = -np.log1p(-(np.arange(200_000) + 0.5) / 200_000)
-    decibels = 10 * np.log10(power) - LOG_MEAN_DB
-    left = decibels[decibels <= limit_db]
-    return float(-left.mean()), float(left.std())
 
 
 @njit(nogil=True, cache=True)

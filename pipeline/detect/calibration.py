@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import log
 
 import numpy as np
@@ -50,3 +51,13 @@ def estimation_loss_db(pfa: float, db_per_step: float) -> float:
         log(false_alarm_probability(mu - 0.05, db_per_step)) - log(false_alarm_probability(mu + 0.05, db_per_step))
     )
     return float(slope * LOG_RAYLEIGH_SD_DB**2 / 2)
+
+
+@lru_cache(maxsize=16)
+def truncated_rayleigh_db(limit_db: float) -> tuple[float, float]:
+    """How much the mean of log Rayleigh clutter loses when nothing is more than limit_db above it, and what spread is
+    left."""
+    power = -np.log1p(-(np.arange(200_000) + 0.5) / 200_000)
+    decibels = 10 * np.log10(power) - LOG_MEAN_DB
+    left = decibels[decibels <= limit_db]
+    return float(-left.mean()), float(left.std())
