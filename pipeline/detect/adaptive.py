@@ -85,8 +85,7 @@ class AdaptiveState(ArrayState):
 
 @dataclass(frozen=True)
 class Adaptive:
-    """See the module. The first `learn_scans` scans only learn: a false alarm in each of a million cells of unlearned
-    texture would be thousands; what stands on the pavement meanwhile is not learned away.
+    """See the module. The first `learn_scans` scans only learn; what stands on the pavement is not learned away.
 
     pfa: false alarm probability in Rayleigh and Weibull clutter. macro_cell_m: side of the macro-cells. level_scans:
     memory of the levels. offset_scans: memory of the offsets once the start is over; it begins with a sixth of it.
