@@ -66,7 +66,7 @@ async def serve(websocket: WebSocket, hub: Hub) -> None:
             with contextlib.suppress(Exception):
                 async with asyncio.timeout(1.0):
                     await client.answers()
-        await _close(websocket, ended)
+        await close_or_cut(websocket, ended.code, ended.reason)
 
 
 async def _run(websocket: WebSocket, client: Client, hub: Hub) -> Ended | None:
@@ -146,8 +146,8 @@ async def _frame(websocket: WebSocket, hub: Hub) -> str:
     return text
 
 
-async def _close(websocket: WebSocket, ended: Ended) -> None:
-    """Close with a code even when the peer does not read, and cut the connection when that does not help.
+async def close_or_cut(websocket: WebSocket, code: int, reason: str, patience: float = CLOSE_S) -> None:
+    """Close with a code even when the peer does not read; cut the connection when that has not helped in `patience` s.
 
     The server's protocol (reached through the ASGI `send` that the middleware kept) waits for room before it writes;
     a peer that never reads would hold the connection and its buffers for ever.
@@ -158,7 +158,7 @@ async def _close(websocket: WebSocket, ended: Ended) -> None:
     if writable is not None:
         writable.set()
     with contextlib.suppress(Exception):
-        async with asyncio.timeout(CLOSE_S):
-            await websocket.close(ended.code, ended.reason)
+        async with asyncio.timeout(patience):
+            await websocket.close(code, reason)
     if transport is not None:
-        asyncio.get_running_loop().call_later(CLOSE_S, transport.abort)
+        asyncio.get_running_loop().call_later(patience, transport.abort)

@@ -29,7 +29,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, WebSocketException
 from websockets.typing import Subprotocol
 
-from app.live.session import origin_allowed
+from app.live.session import close_or_cut, origin_allowed
 from app.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -118,7 +118,7 @@ def router(view: View, settings: Settings) -> APIRouter:
         await websocket.accept(wanted)
         if len(open_now) >= VIEWERS:
             view.count("refused_full")
-            await _close(websocket, 1013, "too many viewers")
+            await close_or_cut(websocket, 1013, "too many viewers", CLOSE_S)
             return
         open_now.add(websocket)
         try:
@@ -161,7 +161,7 @@ async def _serve(websocket: WebSocket, view: View, wanted: str) -> None:
                 code, reason = 1011, "internal error"
     except Refusal as refusal:
         code, reason = refusal.code, refusal.reason
-    await _close(websocket, code, reason)
+    await close_or_cut(websocket, code, reason, CLOSE_S)
 
 
 @contextlib.asynccontextmanager
@@ -213,20 +213,6 @@ async def _to_page(viser: ClientConnection, websocket: WebSocket) -> None:
                     await (websocket.send_bytes(frame) if isinstance(frame, bytes) else websocket.send_text(frame))
             except TimeoutError as error:
                 raise Refusal(1013, "the page does not keep up") from error
-
-
-async def _close(websocket: WebSocket, code: int, reason: str) -> None:
-    """Close; a peer that does not read is cut after a while."""
-    protocol = websocket.scope.get("airside.protocol")
-    transport = getattr(protocol, "transport", None)
-    writable = getattr(protocol, "writable", None)
-    if writable is not None:
-        writable.set()
-    with contextlib.suppress(Exception):
-        async with asyncio.timeout(CLOSE_S):
-            await websocket.close(code, reason)
-    if transport is not None:
-        asyncio.get_running_loop().call_later(CLOSE_S, transport.abort)
 
 
 @lru_cache(maxsize=4)
