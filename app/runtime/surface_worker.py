@@ -10,7 +10,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from typing import Any
 
-from app.contract import PictureListener
+from app.contract import PictureListener, Refused
 from app.runtime.queues import Closed, Inbox
 from pipeline.engine import SurfaceEngine
 from pipeline.picture import AlertChange, Picture, SensorState
@@ -85,11 +85,21 @@ class SurfaceWorker:
         return end
 
     def ask(self, work: Callable[[SurfaceEngine], Any], timeout: float = 5.0) -> Any:
-        """Do `work` in the surface thread and give its result; its exception is raised here."""
+        """Do `work` in the surface thread and give its result; its exception is raised here.
+
+        Raises Refused when the thread does not run, takes no more, or does not answer in `timeout` seconds.
+        """
         answer: Future[Any] = Future()
+        if not self.alive:
+            raise Refused("the service is starting or ending")
         if not self.inbox.offer(Command(work, answer)):
-            raise RuntimeError("the surface thread takes no more work")
-        return answer.result(timeout)
+            raise Refused("the queue for commands is full")
+        try:
+            return answer.result(timeout)
+        except TimeoutError as error:
+            if answer.cancel():
+                raise Refused(f"no answer within {timeout:g} s; nothing was done") from error
+            raise Refused(f"no answer within {timeout:g} s; it may still be done") from error
 
     def record_change(self, change: AlertChange) -> None:
         """A change made by a command (an acknowledgement): goes out with the next picture. Surface thread only."""
