@@ -82,6 +82,8 @@ def bench_frontend(
     yield _extract(watch, extractor, storm)
     for blocks in (1, BLOCKS):
         yield _scan(watch, RadarChain(SITE, 0, detector, extractor), work, blocks)
+    for blocks in (1, BLOCKS):
+        yield _scan(watch, RadarChain(SITE, 0, Adaptive(), extractor, surface=_surface()), work, blocks, settle=80)
     if peers:
         yield from _peers(Stopwatch(clock, max(3, repeats // 10), work.frames), work)
 
@@ -119,11 +121,12 @@ def _detect(
 ) -> BenchRow:
     """surface: the map for detectors that use one. settle: turns before the first that counts, for those that learn."""
     state = detector.start(VIDEO, surface)
+    turn_of = _fresh_turn if settle else _turn
     for turn in range(settle):
-        detector(_turn(work.frames, turn), state)
+        detector(turn_of(work.frames, turn), state)
     return watch.row(
         f"detect ({_name(detector)})",
-        lambda turn: _turn(work.frames, settle + turn),
+        lambda turn: turn_of(work.frames, settle + turn),
         lambda block: detector(block, state),
         note="bit mask, macro-cell means, thresholds" if surface is None else "with a map of surfaces, after learning",
     )
@@ -148,12 +151,15 @@ def _extract(watch: Stopwatch, extractor: Extractor, work: Workload) -> BenchRow
     )
 
 
-def _scan(watch: Stopwatch, chain: RadarChain, work: Workload, blocks: int) -> BenchRow:
+def _scan(watch: Stopwatch, chain: RadarChain, work: Workload, blocks: int, settle: int = 0) -> BenchRow:
+    turn_of = _fresh_turn if settle else _turn
+    for turn in range(settle):
+        chain.process(turn_of(work.frames, turn))
     return watch.row(
-        f"whole scan, {blocks} block{'s' if blocks > 1 else ''}",
-        lambda turn: _cut(_turn(work.frames, turn), blocks),
+        f"whole scan ({_name(chain.detector)}), {blocks} block{'s' if blocks > 1 else ''}",
+        lambda turn: _cut(turn_of(work.frames, settle + turn), blocks),
         lambda pieces: [chain.process(one) for one in pieces],
-        note=f"detect, extract at {work.runs:,} runs, keep the picture, make the tables",
+        note=f"detect, extract at about {work.runs:,} runs, keep the picture, make the tables",
     )
 
 
@@ -198,6 +204,12 @@ def _turn(frames: NDArray[np.uint8], turn: int) -> Sweeps:
     row = np.arange(VIDEO.azimuths, dtype=np.int32)
     azimuth = ((row + 0.5) * VIDEO.azimuth_step_rad).astype(np.float64)
     return Sweeps(0, turn, row, azimuth, azimuth / (2 * np.pi) + turn, frames[turn % FRAMES], last=True)
+
+
+def _fresh_turn(frames: NDArray[np.uint8], turn: int) -> Sweeps:
+    """The same, turned by another angle every time: what learns each cell would learn a speckle that comes again."""
+    made = _turn(frames, turn)
+    return replace(made, amplitude=np.roll(made.amplitude, 997 * turn % VIDEO.azimuths, axis=0))
 
 
 def _cut(turn: Sweeps, blocks: int) -> list[Sweeps]:

@@ -18,6 +18,8 @@ def test_every_line_is_measured_and_related_to_the_floor() -> None:
         "extract",
         "whole scan",
         "whole scan",
+        "whole scan",
+        "whole scan",
     ]
     assert all(row.median_s == row.least_s == 1.0 and row.ratio == 1.0 for row in rows)  # every step of this clock is 1
     runs = [int(row.name.split(", ")[1].split(" ")[0].replace(",", "")) for row in rows[3:5]]
