@@ -14,7 +14,7 @@ from dataclasses import fields, is_dataclass
 from functools import cache
 from typing import Any
 
-VERBS = ("detect", "extract", "associate", "filter", "lifecycle", "classify", "alert")
+VERBS = ("detect", "extract", "bearing", "associate", "filter", "lifecycle", "classify", "alert")
 """The folders of `pipeline` that hold parts."""
 
 

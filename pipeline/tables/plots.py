@@ -26,7 +26,17 @@ class Plots(Table):
     cells: Array = column("i4", "", "number of detected cells")
     mean_amplitude: Array = column("f4", "step", "mean log amplitude of the cells")
     peak_amplitude: Array = column("f4", "step", "greatest log amplitude of the cells")
-    bearing: Array = column("f4", "rad", "direction of the long axis, modulo pi; or nan", default=float("nan"))
+    weighted_east: Array = column(
+        "f8", "m", "centroid of the cells weighted by amplitude, east; nan when not made", default=float("nan")
+    )
+    weighted_north: Array = column(
+        "f8", "m", "centroid of the cells weighted by amplitude, north; nan when not made", default=float("nan")
+    )
+    bearing: Array = column(
+        "f4", "rad", "direction of the long axis, modulo pi unless nose_known; or nan", default=float("nan")
+    )
+    nose_known: Array = column("?", "", "bearing is where the nose points, 0 to 2 pi", default=False)
+    type: Array = column("U4", "", "ICAO type that the echo looks like most; empty when not estimated", default="")
     bearing_sd: Array = column("f4", "rad", "standard deviation of bearing, or nan", default=float("nan"))
     window: Array = column(
         "i4", "", "first azimuth row, rows (may pass north), first range cell, cells", shape=(4,), default=0

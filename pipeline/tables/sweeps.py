@@ -74,11 +74,13 @@ class Sweeps:
 class Detections:
     """One bit a cell of a block: bit j % 64 of word j // 64 is range cell j. mask: (n, words) uint64.
 
-    threshold: (n, ...) is not kept; `degraded` says that the block hit the detector's cap on runs.
+    degraded: the block hit the detector's cap on runs. growth: (n, words) uint64, or None: the cells above a lower
+    threshold, for extractors that grow plots out of the detected cells (`Detector.start`, growth_db).
     """
 
     mask: NDArray[np.uint64]
     degraded: bool = False
+    growth: NDArray[np.uint64] | None = None
 
     def cells(self, ranges: int) -> NDArray[np.bool_]:
         """The same as (n, ranges) booleans, for tests and pictures; not for the hot path."""
