@@ -21,9 +21,9 @@ from pipeline.airport.model import SurfaceKind
 from pipeline.chain import RadarChain
 from pipeline.detect import Detector
 from pipeline.detect.adaptive import Adaptive
-from pipeline.detect.hybrid import Hybrid
 from pipeline.extract import Extractor
 from pipeline.extract.manhattan import Manhattan
+from pipeline.parts import build
 from pipeline.sites import RadarSite
 from pipeline.tables import Detections, Sweeps, VideoFormat
 
@@ -70,7 +70,7 @@ def bench_frontend(
     clock: seconds of a steady clock. repeats: turns a row (a tenth of it, at least 3, for the slow ones). peers: also
     numpy, scipy and, where it is installed, OpenCV. detector, extractor: parts to measure instead of the defaults.
     """
-    detector = detector or Hybrid()
+    detector = detector or build("detect", "hybrid", {})
     extractor = extractor or Manhattan()
     work = workload(detector, targets=160)
     storm = Workload(work.frames, *_speckle(40_000))

@@ -106,3 +106,45 @@ def test_a_start_in_mid_turn_makes_no_flood() -> None:
             turn = Sweeps(0, number, turn.row[keep], turn.azimuth[keep], turn.time[keep], turn.amplitude[keep])
         found += int(part(turn, state).cells(VIDEO.ranges).sum())
     assert found <= 20
+
+
+def growth_scene() -> tuple[Adaptive, list[Sweeps]]:
+    chance = np.random.default_rng(6)
+    turns = []
+    for number in range(16):
+        decibels = 30 + clutter(chance)
+        decibels[100:108, 120:130] = 52.0
+        if number == 15:
+            decibels[100:108, 130:132] = 38.0
+        turns.append(scan(number, decibels))
+    return Adaptive(learn_scans=3), turns
+
+
+def test_growth_holds_the_detected_cells_and_the_cells_above_its_own_margin() -> None:
+    part, turns = growth_scene()
+    plain, state = part.start(VIDEO), part.start(VIDEO, growth_db=7.5)
+    for number, turn in enumerate(turns):
+        found = part(turn, state)
+        alone = part(turn, plain)
+        assert found.growth is not None
+        assert alone.growth is None
+        np.testing.assert_array_equal(found.mask, alone.mask)
+        assert not (found.mask & ~found.growth).any()
+        if number < 3:
+            assert not found.growth.any()
+    cells = np.unpackbits(found.growth.view(np.uint8), axis=1, bitorder="little").astype(bool)
+    assert cells[100:108, 120:132].all()
+    assert not found.cells(VIDEO.ranges)[100:108, 130:132].any()
+    above = np.exp(-(10 ** ((7.5 - 2.51) / 10)))  # of Rayleigh clutter about its log mean
+    assert cells[:90].mean() == pytest.approx(above, rel=0.25)
+
+
+def test_thresholds_are_those_of_the_call_and_change_nothing() -> None:
+    part, turns = growth_scene()
+    state = part.start(VIDEO)
+    for turn in turns:
+        before = state.save()
+        limits = part.thresholds(turn, state)
+        for name, array in state.save().items():
+            np.testing.assert_array_equal(array, before[name])
+        np.testing.assert_array_equal(part(turn, state).cells(VIDEO.ranges), turn.amplitude > limits)
