@@ -6,6 +6,7 @@ section 3, equation (1.1) and figure 3.
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +15,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.detect.calibration import estimation_loss_db, threshold_offset_db
-from pipeline.kernels.bits import add_pairs, bits_above, borrowed, count_runs
+from pipeline.detect.checks import check_pfa, check_positive, check_start, check_whole
+from pipeline.detect.limits import limits_used
+from pipeline.kernels.bits import add_pairs, bits_above, bits_of_row, borrowed, count_runs
 from pipeline.kernels.run_cap import CapSettings, fit_row
 from pipeline.state import ArrayState, read_only, remembered
 from pipeline.tables import Detections, Sweeps, VideoFormat
@@ -71,16 +74,18 @@ class MacroCells:
 @dataclass(eq=False, kw_only=True)
 class HybridState(ArrayState):
     """level, weight: log mean in steps and scans behind it, of each macro-cell. The rest is the macro-cells being
-    swept."""
+    swept; threshold and growth: limits of each cell of the row, growth empty when no growth is asked for."""
 
     cells: MacroCells
     azimuths: int
     offset_steps: float
     loss_steps: float
+    growth_steps: float
     tail: NDArray[np.uint8]
     level: NDArray[np.float64] = remembered()
     weight: NDArray[np.float64] = remembered()
     threshold: NDArray[np.uint8] = remembered()
+    growth: NDArray[np.uint8] = remembered()
     pair_sums: NDArray[np.uint16] = remembered()
     ring_sums: NDArray[np.int64] = remembered()
     ring_rows: NDArray[np.int64] = remembered()
@@ -106,7 +111,7 @@ class Hybrid:
     anything: with 1, the first scan only learns and scan 2 detects with the full Pd. max_runs: cap on runs of detected
     cells a turn; above it the rows concerned get a higher threshold, just as high as needed (`Detections.degraded`,
     counted). A macro-cell within the offset of full scale detects nothing; without any echo (level 0) the offset alone
-    is the threshold.
+    is the threshold. growth_db counts from the same mean; a degraded row grows nothing, so that a flood stays bounded.
     """
 
     pfa: float = 1e-6
@@ -116,17 +121,15 @@ class Hybrid:
     max_runs: int = 40_000
 
     def __post_init__(self) -> None:
-        if not 0 < self.pfa < 0.5:
-            raise ValueError("pfa must lie between 0 and 0.5")
-        if not self.macro_cell_m > 0:
-            raise ValueError("macro_cell_m must be greater than 0")
-        if self.memory < 1 or self.learn_scans < 1 or self.max_runs < 1:
-            raise ValueError("memory, learn_scans and max_runs must be 1 or more")
+        check_pfa(self.pfa)
+        check_positive(macro_cell_m=self.macro_cell_m)
+        check_whole(memory=self.memory, learn_scans=self.learn_scans, max_runs=self.max_runs)
 
-    def start(self, video: VideoFormat, surface: NDArray[np.uint8] | None = None) -> HybridState:
+    def start(
+        self, video: VideoFormat, surface: NDArray[np.uint8] | None = None, growth_db: float | None = None
+    ) -> HybridState:
         """The state before the first sweep. surface is not used: the macro-cells are squares."""
-        if surface is not None and surface.shape != (video.azimuths, video.ranges):
-            raise ValueError(f"surface must be ({video.azimuths}, {video.ranges}), not {surface.shape}")
+        check_start(video, surface, growth_db)
         cells = MacroCells.build(video, self.macro_cell_m)
         rings, many = len(cells.first), len(cells.rows)
         independent = min(1.0, video.azimuth_step_rad / video.beamwidth_rad)
@@ -135,10 +138,12 @@ class Hybrid:
             azimuths=video.azimuths,
             offset_steps=threshold_offset_db(self.pfa, video.db_per_step) / video.db_per_step,
             loss_steps=estimation_loss_db(self.pfa, video.db_per_step) / video.db_per_step / independent,
+            growth_steps=(growth_db or 0.0) / video.db_per_step,
             tail=np.zeros(64, np.uint8),
             level=np.zeros(many),
             weight=np.zeros(many),
             threshold=np.full(64 * video.words, 255, np.uint8),
+            growth=np.full(0 if growth_db is None else 64 * video.words, 255, np.uint8),
             pair_sums=np.zeros(32 * video.words, np.uint16),
             ring_sums=np.zeros(rings, np.int64),
             ring_rows=np.zeros(rings, np.int64),
@@ -151,8 +156,8 @@ class Hybrid:
 
     def __call__(self, sweeps: Sweeps, state: HybridState) -> Detections:
         """The detections of the block."""
-        ranges = sweeps.amplitude.shape[1]
-        mask = np.empty((len(sweeps), (ranges + 63) // 64), np.uint64)
+        mask = np.empty((len(sweeps), state.threshold.size // 64), np.uint64)
+        growth = np.empty((len(sweeps), state.growth.size // 64), np.uint64)
         before = int(state.degraded_sweeps[0])
         cap = CapSettings.of(self.max_runs, state.azimuths)
         cells = state.cells
@@ -160,12 +165,18 @@ class Hybrid:
             read_only(sweeps.amplitude),
             read_only(sweeps.row, np.int64),
             sweeps.scan,
-            mask,
+            (mask, growth),
             cells.stripe_rows,
             (cells.groups, cells.first, cells.until, cells.cells, cells.rows),
-            (state.offset_steps, state.loss_steps, float(self.memory), self.learn_scans - 0.5),
+            (state.offset_steps, state.loss_steps, float(self.memory), self.learn_scans - 0.5, state.growth_steps),
             (cap.refill, cap.depth),
-            (state.level, state.weight, state.threshold.view(np.uint64), state.pair_sums.view(np.uint64)),
+            (
+                state.level,
+                state.weight,
+                state.threshold.view(np.uint64),
+                state.pair_sums.view(np.uint64),
+                state.growth.view(np.uint64),
+            ),
             (
                 state.ring_sums,
                 state.ring_rows,
@@ -176,7 +187,12 @@ class Hybrid:
             (state.budget, state.degraded_sweeps),
             state.tail,
         )
-        return Detections(mask, degraded=int(state.degraded_sweeps[0]) > before)
+        degraded = int(state.degraded_sweeps[0]) > before
+        return Detections(mask, degraded, growth if state.growth.size else None)
+
+    def thresholds(self, sweeps: Sweeps, state: HybridState) -> NDArray[np.uint8]:
+        """(n, ranges) the limits that the call would compare the block with."""
+        return limits_used(self, sweeps, deepcopy(state))
 
 
 PART = Hybrid
@@ -187,7 +203,7 @@ def _detect(
     amplitude: Any,
     rows: Any,
     scan: int,
-    mask: Any,
+    masks: Any,
     stripe_rows: int,
     layout: Any,
     rule: Any,
@@ -198,11 +214,12 @@ def _detect(
     tail: Any,
 ) -> None:
     refill, depth = cap
-    amplitude, rows, mask, tail = borrowed(amplitude), borrowed(rows), borrowed(mask), borrowed(tail)
-    threshold, pair_sums = borrowed(memory[2]), borrowed(memory[3])
+    amplitude, rows, tail = borrowed(amplitude), borrowed(rows), borrowed(tail)
+    mask, grown = borrowed(masks[0]), borrowed(masks[1])
+    threshold, pair_sums, growth = borrowed(memory[2]), borrowed(memory[3]), borrowed(memory[4])
     cursor = borrowed(swept[4])
     budget, degraded = borrowed(flood[0]), borrowed(flood[1])
-    memory = (borrowed(memory[0]), borrowed(memory[1]), threshold, pair_sums)
+    memory = (borrowed(memory[0]), borrowed(memory[1]), threshold, pair_sums, growth)
     swept = (borrowed(swept[0]), borrowed(swept[1]), borrowed(swept[2]), borrowed(swept[3]), cursor)
     layout = (
         borrowed(layout[0]),
@@ -251,6 +268,11 @@ def _detect(
             else:
                 degraded[0] += 1
                 fit_row(amplitude[i], limits_at, bits, budget, tail)
+                for w in range(grown.shape[1]):
+                    grown[i, w] = bits[w]
+                continue
+        if grown.shape[1]:
+            bits_of_row(amplitude[i], growth.ctypes.data, grown[i], tail)
 
 
 @njit(nogil=True, cache=True)
@@ -258,8 +280,8 @@ def _next_stripe(stripe: int, scan: int, layout: Any, rule: Any, memory: Any, sw
     # One function with plain loops over eight bytes at a time: a call that hands on arrays, or a loop whose length the
     # compiler does not know, costs more here than the work itself.
     groups, first_cell, until, full_cells, full_rows = layout
-    mu, loss, most, learn = rule
-    level, weight, threshold, pair_sums = memory
+    mu, loss, most, learn, grow = rule
+    level, weight, threshold, pair_sums, growth = memory
     sums, rows, pending, current, cursor = swept
     new_scan = scan != cursor[2]
     even = np.uint64(0x0000FFFF0000FFFF)
@@ -297,6 +319,11 @@ def _next_stripe(stripe: int, scan: int, layout: Any, rule: Any, memory: Any, sw
         eight = np.uint64(limit) * np.uint64(0x0101010101010101)
         for g in range(groups[k], groups[k + 1]):
             threshold[g] = eight
+        if growth.size:
+            lower = min(np.floor(level[new] + grow + 0.5), limit) if weight[new] >= learn else limit
+            eight = np.uint64(lower) * np.uint64(0x0101010101010101)
+            for g in range(groups[k], groups[k + 1]):
+                growth[g] = eight
     cursor[0] = stripe
     cursor[1] = 0
     cursor[2] = scan

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba import extending, njit, types
 
@@ -116,6 +117,31 @@ def set_bits(typing: Any, word: Any) -> Any:
         return builder.ctpop(words[0])
 
     return types.uint64(types.uint64), build
+
+
+@njit(nogil=True, cache=True)
+def bits_of_row(cells: Any, limits_at: int, bits: Any, tail: Any) -> Any:
+    """Fill one row of words with the cells that exceed their limits, and tell whether any does.
+
+    cells: (ranges) uint8. limits_at: address of the row's limits, 64 bytes a word. bits: (words) uint64. tail: 64 bytes
+    of which those past the row's rest are 0; those before are overwritten.
+    """
+    cells_at, tail_at = cells.ctypes.data, tail.ctypes.data
+    whole = cells.size // 64
+    rest = cells.size - 64 * whole
+    anything = np.uint64(0)
+    for w in range(whole):
+        at = np.uintp(64 * w)
+        word = bits_above(cells_at + at, limits_at + at)
+        bits[w] = word
+        anything |= word
+    if rest:
+        for j in range(rest):
+            tail[j] = cells[64 * whole + j]
+        word = bits_above(tail_at, limits_at + np.uintp(64 * whole))
+        bits[whole] = word
+        anything |= word
+    return anything != np.uint64(0)
 
 
 @njit(nogil=True, cache=True)

@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pipeline.detect import Detector
+from pipeline.detect.calibration import false_alarm_probability
 from pipeline.extract import Extractor
 from pipeline.state import StateError
 from pipeline.tables import Plots, Sweeps, VideoFormat
@@ -40,9 +41,12 @@ def mask_of(part: Detector, blocks: list[Sweeps], state: Any) -> tuple[Any, int]
 
 
 class DetectorContract:
-    """Inherit and give make()."""
+    """Inherit and give make(). scans: enough for the detector to detect. growth_scans: turns after half of which its
+    growth level is settled, and growth_tolerance: how near its share of clutter cells then comes."""
 
     scans = 5
+    growth_scans = 16
+    growth_tolerance = 0.05
 
     def make(self, **setting: Any) -> Detector:
         raise NotImplementedError
@@ -131,6 +135,67 @@ class DetectorContract:
         assert state.counters["degraded_sweeps"] > 0
         pieces, _ = mask_of(part, [one for b in blocks for one in cut(b, range(0, 96, 5))], part.start(SMALL))
         np.testing.assert_array_equal(whole, pieces)
+
+    @settings(max_examples=6, deadline=None, suppress_health_check=INHERITED)
+    @given(cuts=CUTS, missing=st.integers(0, 2**32 - 1), lost=st.sampled_from([0.0, 0.3]))
+    def test_thresholds_are_what_the_call_compares_with(self, cuts: list[int], missing: int, lost: float) -> None:
+        keep = np.random.default_rng(missing).random((self.scans, SMALL.azimuths)) >= lost
+        part = self.make()
+        state, pieces = part.start(SMALL), part.start(SMALL)
+        for block in strip(busy_video(SMALL, self.scans), SMALL, keep):
+            before = state.save()
+            limits = part.thresholds(block, state)
+            for name, array in state.save().items():
+                np.testing.assert_array_equal(array, before[name])
+            found = part(block, state)
+            assert not found.degraded
+            np.testing.assert_array_equal(found.cells(SMALL.ranges), block.amplitude > limits)
+            begin = 0
+            for piece in cut(block, cuts):
+                np.testing.assert_array_equal(part.thresholds(piece, pieces), limits[begin : begin + len(piece)])
+                part(piece, pieces)
+                begin += len(piece)
+
+    @settings(max_examples=6, deadline=None, suppress_health_check=INHERITED)
+    @given(cuts=CUTS, missing=st.integers(0, 2**32 - 1), max_runs=st.sampled_from([60, 40_000]))
+    def test_growth_holds_the_detected_cells_for_every_block_size(
+        self, cuts: list[int], missing: int, max_runs: int
+    ) -> None:
+        keep = np.random.default_rng(missing).random((self.scans, SMALL.azimuths)) >= 0.1
+        part = self.make(max_runs=max_runs)
+        plain, state, pieces = part.start(SMALL), part.start(SMALL, growth_db=7.5), part.start(SMALL, growth_db=7.5)
+        for block in strip(busy_video(SMALL, self.scans), SMALL, keep):
+            alone, found = part(block, plain), part(block, state)
+            assert alone.growth is None
+            assert found.growth is not None
+            np.testing.assert_array_equal(found.mask, alone.mask)
+            assert not (found.mask & ~found.growth).any()
+            grown = [part(piece, pieces).growth for piece in cut(block, cuts)]
+            np.testing.assert_array_equal(found.growth, np.concatenate([one for one in grown if one is not None]))
+        assert np.bitwise_count(found.growth).sum() > np.bitwise_count(found.mask).sum()
+
+    def test_growth_lies_as_far_above_the_clutter_as_was_asked(self) -> None:
+        """By the share of homogeneous Rayleigh clutter that exceeds it; the level rises by a step over the range, so
+        that the rounding is met at all its fractions."""
+        video = VideoFormat(azimuths=128, ranges=256, range_step_m=6.0, beamwidth_rad=0.05)
+        part = self.make()
+        state = part.start(video, growth_db=7.5)
+        rng = np.random.default_rng(12)
+        count = self.growth_scans
+        power = 25.0 + np.linspace(0.0, 0.3125, 256) + 10 * np.log10(rng.exponential(size=(count, 128, 256)))
+        frames = np.clip(np.rint(power / 0.3125), 0, 255).astype(np.uint8)
+        grown = [part(block, state).growth for block in strip(frames, video)]
+        share = np.mean([np.bitwise_count(one).sum() / (128 * 256) for one in grown[-count // 2 :] if one is not None])
+        assert share == pytest.approx(false_alarm_probability(7.5, 0.3125), rel=self.growth_tolerance)
+
+    @pytest.mark.parametrize("growth_db", [-1.0, float("nan"), float("inf")])
+    def test_a_growth_that_makes_no_sense_is_refused(self, growth_db: float) -> None:
+        with pytest.raises(ValueError, match="growth_db"):
+            self.make().start(SMALL, growth_db=growth_db)
+
+    def test_a_surface_of_another_shape_is_refused(self) -> None:
+        with pytest.raises(ValueError, match="surface"):
+            self.make().start(SMALL, np.zeros((3, 3), np.uint8))
 
     def test_writable_or_not_is_the_same(self) -> None:
         part = self.make()

@@ -146,8 +146,3 @@ def test_the_first_scan_only_learns() -> None:
 def test_wrong_settings_are_refused(setting: dict[str, Any]) -> None:
     with pytest.raises(PartError):
         build("detect", "hybrid", setting)
-
-
-def test_a_surface_of_another_shape_is_refused() -> None:
-    with pytest.raises(ValueError, match="surface"):
-        Hybrid().start(SMALL, np.zeros((3, 3), np.uint8))

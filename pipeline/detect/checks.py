@@ -1,0 +1,38 @@
+"""Checks of settings that detectors have in common."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.tables import VideoFormat
+
+
+def check_pfa(pfa: float) -> None:
+    """Raises ValueError for a false alarm probability outside (0, 0.5)."""
+    if not 0 < pfa < 0.5:
+        raise ValueError("pfa must lie between 0 and 0.5")
+
+
+def check_positive(**settings: float) -> None:
+    """Raises ValueError, with its name, for a setting that is not a finite number above 0."""
+    for name, value in settings.items():
+        if not (value > 0 and isfinite(value)):
+            raise ValueError(f"{name} must be greater than 0")
+
+
+def check_whole(least: int = 1, **settings: int) -> None:
+    """Raises ValueError, with its name, for a setting that is no whole number or less than `least`."""
+    for name, value in settings.items():
+        if value != int(value) or value < least:
+            raise ValueError(f"{name} must be a whole number, {least} or more")
+
+
+def check_start(video: VideoFormat, surface: NDArray[np.uint8] | None, growth_db: float | None) -> None:
+    """Raises ValueError for a surface of another shape than the video, or a growth_db that is negative or no number."""
+    if surface is not None and surface.shape != (video.azimuths, video.ranges):
+        raise ValueError(f"surface must be ({video.azimuths}, {video.ranges}), not {surface.shape}")
+    if growth_db is not None and not (growth_db >= 0 and isfinite(growth_db)):
+        raise ValueError("growth_db must be 0 or more")
