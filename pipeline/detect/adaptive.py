@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.detect.calibration import estimation_loss_db, threshold_offset_db, truncated_rayleigh_db
+from pipeline.detect.checks import check_start
 from pipeline.detect.patches import BUILDING, EDGE, GRASS, Patches
 from pipeline.kernels.adaptive import ONE, detect
 from pipeline.kernels.run_cap import CapSettings
@@ -109,11 +110,10 @@ class Adaptive:
         self, video: VideoFormat, surface: NDArray[np.uint8] | None = None, growth_db: float | None = None
     ) -> AdaptiveState:
         """The state before the first sweep. Without a map all is one surface kind."""
+        check_start(video, surface, growth_db)
         shape = (video.azimuths, video.ranges)
         if surface is None:
             surface = np.full(shape, 2, np.uint8)
-        if surface.shape != shape:
-            raise ValueError(f"surface must be {shape}, not {surface.shape}")
         patches = Patches.build(video, surface, self.macro_cell_m)
         kind, many = patches.kind, len(patches.kind)
         step = video.db_per_step

@@ -19,6 +19,8 @@ VIDEO = VideoFormat(azimuths=256, ranges=256, range_step_m=3.0, beamwidth_rad=0.
 
 
 class TestAdaptiveKeepsTheContract(DetectorContract):
+    growth_tolerance = 0.2
+
     def make(self, **setting: Any) -> Detector:
         part: Detector = build("detect", "adaptive", {"learn_scans": 1, **setting})
         return part
