@@ -63,30 +63,26 @@ class Geometry:
 
 def plots_from(radar: int, rows: NDArray[np.float64]) -> Plots:
     """The table made of the kernel's output rows."""
-    n = len(rows)
-
-    def column(first: int, dtype: str) -> NDArray[Any]:
-        return rows[:, first].astype(dtype)
-
-    return Plots(
-        time=column(0, "f8"),
-        radar=np.full(n, radar, np.int16),
-        scan=column(1, "i8"),
-        east=column(2, "f8"),
-        north=column(3, "f8"),
-        covariance=rows[:, [4, 5, 5, 6]].reshape(n, 2, 2),
-        range=column(7, "f8"),
-        azimuth=column(8, "f8"),
-        range_extent=column(9, "f4"),
-        azimuth_extent=column(10, "f4"),
-        length=column(11, "f4"),
-        width=column(12, "f4"),
-        cells=column(13, "i4"),
-        mean_amplitude=column(14, "f4"),
-        peak_amplitude=column(15, "f4"),
-        bearing=column(16, "f4"),
-        bearing_sd=column(17, "f4"),
-        window=rows[:, 18:22].astype("i4"),
+    return Plots.build(
+        len(rows),
+        time=rows[:, 0],
+        radar=radar,
+        scan=rows[:, 1],
+        east=rows[:, 2],
+        north=rows[:, 3],
+        covariance=rows[:, [4, 5, 5, 6]].reshape(-1, 2, 2),
+        range=rows[:, 7],
+        azimuth=rows[:, 8],
+        range_extent=rows[:, 9],
+        azimuth_extent=rows[:, 10],
+        length=rows[:, 11],
+        width=rows[:, 12],
+        cells=rows[:, 13],
+        mean_amplitude=rows[:, 14],
+        peak_amplitude=rows[:, 15],
+        bearing=rows[:, 16],
+        bearing_sd=rows[:, 17],
+        window=rows[:, 18:22],
     )
 
 
