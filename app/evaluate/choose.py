@@ -1,0 +1,66 @@
+"""Which experiments are to be run, and with what settings."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+from pipeline import evaluate
+from pipeline.evaluate import Experiment, RecordedVideo
+
+ALL = "all"
+
+
+class UnknownExperiment(ValueError):
+    """There is no experiment of that name, or it cannot be run like that; the message says what can."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """What is to be run. experiments: by name, in order. left_out: why others are not, one line each."""
+
+    experiments: dict[str, Experiment]
+    left_out: tuple[str, ...] = ()
+
+
+def needs_video(kind: type[Any]) -> bool:
+    """Whether an experiment works on a recording."""
+    return any(one.name == "video" for one in fields(kind))
+
+
+def choose(name: str, *, quick: bool, trials: int | None, video: RecordedVideo | None) -> Chosen:
+    """The experiment called `name`, or all of them, short when `quick`, each with so many trials if given.
+
+    video: handed to experiments that work on a recording. Raises UnknownExperiment.
+    """
+    known = evaluate.experiments()
+    if name == ALL:
+        if not known:
+            raise UnknownExperiment("there are no experiments")
+        names = [one for one, kind in known.items() if video is not None or not needs_video(kind)]
+        left = tuple(f"{one} is left out: it needs a recording (--file)" for one in known if one not in names)
+        return Chosen({one: _made(known[one], quick, trials, video) for one in names}, left)
+    if name not in known:
+        raise UnknownExperiment(f"no experiment is called {name!r}{nearest(name, [*known, ALL])}")
+    if video is None and needs_video(known[name]):
+        raise UnknownExperiment(f"{name} works on a recording: name one with --file")
+    if video is not None and not needs_video(known[name]):
+        raise UnknownExperiment(f"{name} does not work on a recording: leave out --file")
+    return Chosen({name: _made(known[name], quick, trials, video)})
+
+
+def nearest(word: str, among: list[str]) -> str:
+    """What to say after a word that is not known: the one that was meant, or all there are."""
+    close = difflib.get_close_matches(word, among, n=1, cutoff=0.4)
+    return f"; did you mean {close[0]!r}?" if close else f"; there are: {', '.join(sorted(among))}"
+
+
+def _made(kind: type[Any], quick: bool, trials: int | None, video: RecordedVideo | None) -> Experiment:
+    made = kind(video=video) if needs_video(kind) else kind()
+    if quick:
+        made = made.quick()
+    if trials is not None:
+        made = replace(made, trials=trials)
+    experiment: Experiment = made
+    return experiment
