@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from shapely import Polygon, contains_xy
+from shapely import Polygon, contains_xy, union_all
+from shapely.geometry.base import BaseGeometry
 
 from pipeline.simulate.types import TYPES, TargetType
 from pipeline.tables import TargetClass, VideoFormat
@@ -59,12 +60,10 @@ class Posed:
         sine, cosine = math.sin(self.heading), math.cos(self.heading)
         return self.east + forward * sine + right * cosine, self.north + forward * cosine - right * sine
 
-    def outline(self) -> Polygon:
+    def outline(self) -> BaseGeometry:
         """The outline on the ground, metres (east, north) from the radar."""
-        outline = Polygon()
-        for _, corners in parts_of(self.kind):
-            outline = outline.union(Polygon(np.stack(self.place(corners[:, 0], corners[:, 1]), axis=1)))
-        return outline.buffer(0)
+        corners = [np.stack(self.place(one[:, 0], one[:, 1]), axis=1) for _, one in parts_of(self.kind)]
+        return union_all([Polygon(one) for one in corners])
 
 
 @dataclass(frozen=True, slots=True)
@@ -272,7 +271,7 @@ def _speckle(white: Any, beam: float, field: Any) -> None:
 
 
 @njit(nogil=True, cache=True)
-def _illuminate(east: Any, north: Any, strength: Any, phase: Any, grid: Any, echo: Any, power: Any) -> float:
+def _illuminate(east: Any, north: Any, strength: Any, phase: Any, grid: Any, echo: Any, power: Any) -> Any:
     """Add up the echoes, coherently and in power; the mean power at the scatterers is returned."""
     first_row, first_cell, azimuth_step, beam, first_range, step, pulse, azimuths = grid
     rows, cells = power.shape
