@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from math import log
+from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq, newton
+from scipy.special import loggamma
 
 DB = 10 / log(10)
 """Decibels of a natural unit of power ratio."""
@@ -61,3 +66,100 @@ def truncated_rayleigh_db(limit_db: float) -> tuple[float, float]:
     decibels = 10 * np.log10(power) - LOG_MEAN_DB
     left = decibels[decibels <= limit_db]
     return float(-left.mean()), float(left.std())
+
+
+def log_mean_offset_db(
+    pfa: float, db_per_step: float, weights: NDArray[np.float64], many: NDArray[np.float64]
+) -> float:
+    """Decibels to add to a weighted mean of log amplitudes of Rayleigh clutter that is itself such clutter.
+
+    weights: (n) weights of the mean, many: (n) how many independent amplitudes have each; sum(weights * many) is 1.
+    With E and E_i exponential, Pfa is the mean of exp(-a * prod(E_i ** w_i)), a the offset as a ratio. Its Mellin
+    transform in a is Gamma(s) * prod(Gamma(1 - s w_i)), times that of the rounding of the amplitudes and of the limit
+    to whole steps; it is turned back by a sum along the line through the saddle point, without any approximation but
+    that the rounding is met at all its fractions alike. Raises ValueError for a pfa outside (0, 1).
+    """
+    if not 0 < pfa < 1:
+        raise ValueError("pfa must lie between 0 and 1")
+    step = db_per_step / DB
+    end = 1 / float(weights.max())
+
+    def exponent(s: NDArray[Any]) -> NDArray[Any]:
+        scaled = s[:, None] * weights
+        half = scaled * step / 2
+        clutter = (loggamma(1 - scaled) + np.log(np.sinh(half) / half)) @ many
+        return np.asarray(loggamma(s) + clutter + np.log(-np.expm1(-s * step) / (s * step)))
+
+    def real(c: float) -> float:
+        return float(exponent(np.array([c + 0j]))[0].real)
+
+    def slope(c: float) -> float:
+        near = 1e-4 * min(c, end - c)
+        return (real(c + near) - real(c - near)) / (2 * near)
+
+    c = float(brentq(lambda one: real(one) - one * slope(one) - log(pfa), 1e-6 * end, (1 - 1e-6) * end, xtol=1e-6))
+    spacing = min(c, end - c, 4.0) / 4
+    line = c + 1j * spacing * np.arange(int(80 / spacing))
+    height = exponent(line)
+    level = height[0].real
+    terms = np.exp(height - level) * np.where(line.imag == 0, 0.5, 1.0) * spacing / np.pi
+
+    def excess(ratio: float) -> float:
+        total = float((terms * np.exp(-line * ratio)).sum().real) * np.exp(c * ratio)
+        return float(np.log(max(total, 1e-30))) + level - c * ratio - log(pfa)
+
+    return float(newton(excess, slope(c), tol=1e-9)) * DB
+
+
+@lru_cache(maxsize=64)
+def mean_offsets_db(pfa: float, db_per_step: float, most: int) -> NDArray[np.float64]:
+    """(most + 1) `log_mean_offset_db` of the plain mean of as many amplitudes; of none, infinite."""
+    return _by_count(lambda n: log_mean_offset_db(pfa, db_per_step, np.array([1 / n]), np.array([n])), most)
+
+
+@lru_cache(maxsize=64)
+def recursive_mean_offsets_db(pfa: float, db_per_step: float, memory: int) -> NDArray[np.float64]:
+    """(6 * memory + 1) `log_mean_offset_db` by scans heard, of a mean with gain 1/scans, at least 1/memory.
+
+    From 6 * memory scans on it changes no more.
+    """
+    every = np.full(6 * memory + 1, np.inf)
+    every[: memory + 1] = mean_offsets_db(pfa, db_per_step, memory)
+    late = memory + np.unique(
+        np.rint(memory * np.array([0.0, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0])).astype(int)
+    )
+    solved = [log_mean_offset_db(pfa, db_per_step, *_recursive_weights(int(n), memory)) for n in late]
+    every[memory:] = np.interp(np.arange(memory, 6 * memory + 1), late, solved)
+    every.flags.writeable = False
+    return every
+
+
+def _recursive_weights(heard: int, memory: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Weights of a recursive mean and how many scans have each; old scans in groups of nearly equal weight."""
+    later = heard - memory
+    edges = np.unique(np.linspace(0, later, min(later, 128) + 1).astype(int))
+    kept = (1 - 1 / memory) ** edges
+    many = np.append(np.diff(edges).astype(float), memory)
+    return np.append(-np.diff(kept), kept[-1]) / many, many
+
+
+def censored_bias_db(limit_db: float, freeze_db: float) -> float:
+    """How far the recursive log mean of Rayleigh clutter settles too low when no more than limit_db above it is taken
+    into it, and nothing that is freeze_db above the true mean."""
+    power = -np.log1p(-(np.arange(200_000) + 0.5) / 200_000)
+    decibels = DB * np.log(power) - LOG_MEAN_DB
+    decibels = decibels[decibels <= freeze_db] - decibels.mean()
+    return float(brentq(lambda low: float(np.minimum(decibels + low, limit_db).mean()), -1e-9, 60.0, xtol=1e-9))
+
+
+def _by_count(solve: Callable[[float], float], most: int) -> NDArray[np.float64]:
+    """(most + 1) a smooth function of a count: solved where it bends, in between by a spline in 1 / count."""
+    counts = np.unique([*range(1, min(most, 8) + 1), *np.rint(np.geomspace(min(most, 8), most, 24)).astype(int)])
+    solved = np.array([solve(float(n)) for n in counts])
+    every = np.full(most + 1, np.inf)
+    if len(counts) < 4:
+        every[counts] = solved
+    else:
+        every[1:] = CubicSpline(1 / counts[::-1], solved[::-1])(1 / np.arange(1, most + 1))
+    every.flags.writeable = False
+    return every

@@ -8,10 +8,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from pipeline.kernels.bits import bits_above_raised, count_runs
-
-RAISE_STEPS = 8
-"""A row with too many runs is compared again with limits this many steps higher, as often as it takes."""
+from pipeline.kernels.bits import bits_above_raised, bits_of_row, count_runs
 
 
 @dataclass(frozen=True)
@@ -28,24 +25,64 @@ class CapSettings:
 
 
 @njit(nogil=True, cache=True)
+def detect_row(
+    cells: Any, limits: Any, growth: Any, bits: Any, grown: Any, cap: Any, budget: Any, degraded: Any, tail: Any
+) -> None:
+    """Compare one row with its limits, within the bucket.
+
+    cells: (ranges) uint8. limits, growth: (64 * words) uint8; growth may be empty. bits, grown: (words) uint64, to
+    fill. cap: refill and depth of the bucket. budget, degraded: the bucket and the count of raised rows, changed. tail:
+    see `bits_of_row`. A raised row grows nothing, so that a flood stays bounded for what follows, too.
+    """
+    budget[0] = min(budget[0] + cap[0], cap[1])
+    raised = False
+    if bits_of_row(cells, limits.ctypes.data, bits, tail):
+        runs = count_runs(bits)
+        raised = runs > budget[0]
+        if raised:
+            degraded[0] += 1
+            fit_row(cells, limits.ctypes.data, bits, budget, tail)
+        else:
+            budget[0] -= runs
+    if growth.size:
+        if raised:
+            for w in range(bits.size):
+                grown[w] = bits[w]
+        else:
+            bits_of_row(cells, growth.ctypes.data, grown, tail)
+            for w in range(bits.size):
+                grown[w] |= bits[w]
+
+
+@njit(nogil=True, cache=True)
 def fit_row(cells: Any, limits_at: int, mask: Any, budget: Any, tail: Any) -> None:
     """Take the runs of one row out of the bucket; they do not fit, so the limits are raised until they do.
 
-    cells: (ranges) uint8. limits_at: address of the row's limits, 64 bytes a word. mask: (words) uint64, rewritten when
-    needed. tail: 64 bytes of which those past the row's rest are 0.
+    Halving finds how much in eight passes, whatever the row: everything is below a limit raised by 255.
+
+    cells: (ranges) uint8. limits_at: address of the row's limits, 64 bytes a word. mask: (words) uint64, rewritten.
+    tail: 64 bytes of which those past the row's rest are 0.
     """
-    runs = count_runs(mask)
-    raised = 0
+    low, high = 0, 255
+    while high - low > 1:
+        middle = (low + high) // 2
+        _raise(cells, limits_at, mask, tail, middle)
+        if count_runs(mask) > budget[0]:
+            low = middle
+        else:
+            high = middle
+    _raise(cells, limits_at, mask, tail, high)
+    budget[0] -= count_runs(mask)
+
+
+@njit(nogil=True, cache=True)
+def _raise(cells: Any, limits_at: int, mask: Any, tail: Any, raised: int) -> None:
+    step = np.uint64(raised)
     whole = cells.size // 64
-    while runs > budget[0]:
-        raised = min(raised + RAISE_STEPS, 255)
-        step = np.uint64(raised)
-        for w in range(whole):
-            at = np.uintp(64 * w)
-            mask[w] = bits_above_raised(cells.ctypes.data + at, limits_at + at, step)
-        if cells.size > 64 * whole:
-            for j in range(cells.size - 64 * whole):
-                tail[j] = cells[64 * whole + j]
-            mask[whole] = bits_above_raised(tail.ctypes.data, limits_at + np.uintp(64 * whole), step)
-        runs = count_runs(mask)
-    budget[0] -= runs
+    for w in range(whole):
+        at = np.uintp(64 * w)
+        mask[w] = bits_above_raised(cells.ctypes.data + at, limits_at + at, step)
+    if cells.size > 64 * whole:
+        for j in range(cells.size - 64 * whole):
+            tail[j] = cells[64 * whole + j]
+        mask[whole] = bits_above_raised(tail.ctypes.data, limits_at + np.uintp(64 * whole), step)

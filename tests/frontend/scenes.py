@@ -59,3 +59,9 @@ def packed(cells: NDArray[np.bool_]) -> Detections:
     padded = np.zeros((len(cells), 64 * words), bool)
     padded[:, : cells.shape[1]] = cells
     return Detections(np.packbits(padded, axis=1, bitorder="little").view(np.uint64))
+
+
+def false_alarm_share(limits: NDArray[np.uint8], mean_db: NDArray[np.float64], db_per_step: float = 0.3125) -> float:
+    """Exact chance, mean over the cells, that rounded Rayleigh amplitudes of these mean powers exceed these limits."""
+    edge_db = (limits.astype(float) + 0.5) * db_per_step
+    return float(np.where(limits == 255, 0.0, np.exp(-(10 ** ((edge_db - mean_db) / 10)))).mean())
