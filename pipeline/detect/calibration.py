@@ -105,8 +105,8 @@ def log_mean_offset_db(
     terms = np.exp(height - level) * np.where(line.imag == 0, 0.5, 1.0) * spacing / np.pi
 
     def excess(ratio: float) -> float:
-        total = float((terms * np.exp(-line * ratio)).sum().real) * np.exp(c * ratio)
-        return float(np.log(max(total, 1e-30))) + level - c * ratio - log(pfa)
+        total = float((terms * np.exp((c - line) * ratio)).sum().real)
+        return log(max(total, 1e-30)) + float(level) - c * ratio - log(pfa)
 
     return float(newton(excess, slope(c), tol=1e-9)) * DB
 

@@ -155,7 +155,7 @@ class ClutterMap:
         own = float(recursive_mean_offsets_db(self.pfa, db_per_step, self.memory)[-1])
         decibels[late] += censored_bias_db(limit, own if freeze else np.inf)
         steps = np.where(np.arange(len(decibels)) < self.learn_scans, 512.0, decibels / db_per_step)
-        return np.rint(np.minimum(steps, 512.0) * ONE).astype(np.int32)
+        return np.asarray(np.rint(np.minimum(steps, 512.0) * ONE), np.int32)
 
 
 PART = ClutterMap
