@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -45,8 +46,11 @@ class RadarChain:
         self._clock = clock
         self._detecting = detector.start(site.video, surface)
         self._extracting = extractor.start(site)
+        self._surface = "none" if surface is None else f"{zlib.crc32(np.ascontiguousarray(surface).tobytes()):08x}"
         self._next_row = -1
         self._closed_to = -1
+        self._scans_before = 0
+        self._carried: dict[str, int] = {}
         self._counts = dict.fromkeys(
             ("blocks", "sweeps", "missing_sweeps", "late_blocks", "late_sweeps", "plots", "degraded_blocks"), 0
         )
@@ -54,7 +58,8 @@ class RadarChain:
     @property
     def counters(self) -> dict[str, int]:
         """What was worked on, and what was not, by reason; they only grow."""
-        return {**self._counts, **self._detecting.counters, **self._extracting.counters}
+        own = self._own_counters()
+        return {**self._carried, **{name: count + self._carried.get(name, 0) for name, count in own.items()}}
 
     def process(self, block: Sweeps) -> SectorPlots:
         """Work on one block; blocks come in order of scan and row, with gaps where nothing was received.
@@ -68,7 +73,7 @@ class RadarChain:
             return self._sector(block.scan, Plots.empty(), degraded=False)
         self._count(fresh)
         self._timed("keep", self._keep, fresh)
-        found: Detections = self._timed("detect", self.detector, fresh, self._detecting)
+        found: Detections = self._timed("detect", self.detector, self._numbered(fresh), self._detecting)
         plots: Plots = self._timed("extract", self.extractor, fresh, found, self._extracting)
         self.time = float(fresh.time[-1])
         self._counts["plots"] += len(plots)
@@ -86,20 +91,16 @@ class RadarChain:
         it."""
         kept = {f"detect.{name}": array for name, array in self._detecting.save().items()}
         kept |= {f"extract.{name}": array for name, array in self._extracting.save().items()}
-        kept["chain.parts"] = np.array(self._parts())
-        kept["chain.rows"] = np.array([self._next_row, self._closed_to], np.int64)
+        kept |= {f"chain.{name}": np.array(words) for name, words in self._origin().items()}
+        kept["chain.rows"] = np.array([self._next_row, self._closed_to, self._scans_before], np.int64)
         kept["chain.time"] = np.array([self.time])
         return kept
 
     def restore(self, saved: Mapping[str, NDArray[Any]]) -> None:
-        """Take up what save() gave. Raises StateError when it belongs to other parts, settings or another video
-        format."""
-        try:
-            parts, rows, time = saved["chain.parts"], saved["chain.rows"], saved["chain.time"]
-        except KeyError as missing:
-            raise StateError(f"the saved state has no {missing}") from missing
-        if list(parts) != self._parts():
-            raise StateError(f"the saved state belongs to {', '.join(map(str, parts))}")
+        """Take up what save() gave and go on at the row after it. Raises StateError when it belongs to other parts,
+        settings, another site, video format or map."""
+        rows, time = _numbers(saved, "chain.rows", 3), _numbers(saved, "chain.time", 1)
+        self._check_origin(saved)
         before = self._detecting.save()
         self._detecting.restore(_under("detect.", saved))
         try:
@@ -107,8 +108,54 @@ class RadarChain:
         except StateError:
             self._detecting.restore(before)
             raise
-        self._next_row, self._closed_to = (int(one) for one in rows)
+        self._next_row, self._closed_to, self._scans_before = (int(one) for one in rows)
         self.time = float(time[0])
+
+    def resume(self, saved: Mapping[str, NDArray[Any]]) -> None:
+        """Take up what the detector of save() had learned, and count rows and scans anew: for the start of a process.
+
+        Raises StateError, changing nothing, when a block was already worked on, or when it belongs to another
+        detector, other settings of it, another site, video format or map.
+        """
+        if self._next_row >= 0:
+            raise StateError("only a chain that has not begun can resume")
+        rows = _numbers(saved, "chain.rows", 3)
+        self._check_origin(saved, besides="extract")
+        if not (-1 <= rows[0] < 2**48 and 0 <= rows[2] < 2**32):
+            raise StateError("the saved rows cannot be true")
+        self._detecting.restore(_under("detect.", saved))
+        self._scans_before = int(rows[2] - -rows[0] // self.site.video.azimuths)
+        self._carry({})
+
+    def learn(self, block: Sweeps) -> None:
+        """Let the detector learn from a block that another chain works on. Raises TableError like process()."""
+        self._check(block)
+        fresh = self._fresh(block)
+        if len(fresh):
+            self.detector(self._numbered(fresh), self._detecting)
+            self._next_row = fresh.scan * self.site.video.azimuths + int(fresh.row[-1]) + 1
+
+    def take_over(self, before: RadarChain) -> None:
+        """Go on where `before`, a chain of the same radar, stopped: its rows, picture and counters; and what its
+        detector had learned, when this one is the same. Call before.flush() first. Raises ValueError for another
+        site."""
+        if before.site != self.site:
+            raise ValueError(f"a chain of radar {self.site.id} cannot take over from one of {before.site.id}")
+        if self.detects_like(before):
+            self._detecting.restore(before._detecting.save())
+            self._scans_before = before._scans_before
+        self.newest, self.time = before.newest, before.time
+        self._next_row, self._closed_to = before._next_row, before._closed_to
+        self._carry(before.counters)
+
+    def detects_like(self, other: RadarChain) -> bool:
+        """The detector of both is the same, on the same map: what one has learned fits the other."""
+        return (self.detector, self._surface) == (other.detector, other._surface)
+
+    @property
+    def scans_to_learn(self) -> int:
+        """Scans for which the detector only learns before it detects."""
+        return int(getattr(self.detector, "learn_scans", 0))
 
     def warm(self) -> None:
         """Compile everything (or load it from the cache) on a tiny radar, leaving this chain's state alone."""
@@ -123,8 +170,30 @@ class RadarChain:
             tiny.process(Sweeps(0, scan, row, azimuth, azimuth + scan, amplitude, last=True))
         tiny.flush()
 
-    def _parts(self) -> list[str]:
-        return [type(self.detector).__name__, type(self.extractor).__name__]
+    def _own_counters(self) -> dict[str, int]:
+        return {**self._counts, **self._detecting.counters, **self._extracting.counters}
+
+    def _carry(self, counted: Mapping[str, int]) -> None:
+        """Let the counters go on from these."""
+        own = self._own_counters()
+        self._carried = {name: counted.get(name, 0) - own.get(name, 0) for name in {**own, **counted}}
+
+    def _origin(self) -> dict[str, str]:
+        """What a saved state belongs to."""
+        parts = {"detect": repr(self.detector), "extract": repr(self.extractor)}
+        return {**parts, "site": repr(self.site), "map": self._surface}
+
+    def _check_origin(self, saved: Mapping[str, NDArray[Any]], besides: str = "") -> None:
+        for name, mine in self._origin().items():
+            given = saved.get(f"chain.{name}")
+            if given is None:
+                raise StateError(f"the saved state has no 'chain.{name}'")
+            if name != besides and str(given) != mine:
+                raise StateError(f"the saved state belongs to another {name}: {str(given)[:300]}, not {mine}")
+
+    def _numbered(self, block: Sweeps) -> Sweeps:
+        """The block with its scan as the detector counts: its scans go on rising when those of the rows begin anew."""
+        return replace(block, scan=block.scan + self._scans_before) if self._scans_before else block
 
     def _check(self, block: Sweeps) -> None:
         video = self.site.video
@@ -199,3 +268,11 @@ class RadarChain:
 
 def _under(prefix: str, saved: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     return {name.removeprefix(prefix): array for name, array in saved.items() if name.startswith(prefix)}
+
+
+def _numbers(saved: Mapping[str, NDArray[Any]], name: str, many: int) -> NDArray[Any]:
+    """The saved array called so. Raises StateError when it is not that many numbers."""
+    array = saved.get(name)
+    if array is None or array.shape != (many,) or array.dtype.kind not in "if":
+        raise StateError(f"the saved state has no {name!r}, or not {many} numbers in it")
+    return array

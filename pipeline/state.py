@@ -41,11 +41,18 @@ class ArrayState:
                     f"{name}: {mine.dtype} {mine.shape} wanted, {given.dtype} {given.shape} saved;"
                     " the video format or the settings have changed"
                 )
+        self.refuse_untrue(saved)
         unknown = set(saved) - set(self._names())
         if unknown:
             raise StateError(f"the saved state has unknown {', '.join(sorted(unknown))}")
         for name in self._names():
             getattr(self, name)[...] = saved[name]
+
+    def refuse_untrue(self, saved: Mapping[str, NDArray[Any]]) -> None:
+        """Raise StateError for values that would do harm, such as an index out of bounds; dtypes and shapes are right.
+
+        A state that keeps indices overrides this.
+        """
 
     def _names(self) -> list[str]:
         return [f.name for f in fields(self) if f.metadata.get("remembered")]

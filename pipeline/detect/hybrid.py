@@ -6,6 +6,7 @@ section 3, equation (1.1) and figure 3.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
@@ -19,7 +20,7 @@ from pipeline.detect.checks import check_pfa, check_positive, check_start, check
 from pipeline.detect.limits import limits_used
 from pipeline.kernels.bits import add_pairs, bits_above, bits_of_row, borrowed, count_runs
 from pipeline.kernels.run_cap import CapSettings, fit_row
-from pipeline.state import ArrayState, read_only, remembered
+from pipeline.state import ArrayState, StateError, read_only, remembered
 from pipeline.tables import Detections, Sweeps, VideoFormat
 
 STRIPE_ROWS = 8
@@ -94,6 +95,11 @@ class HybridState(ArrayState):
     cursor: NDArray[np.int64] = remembered()
     budget: NDArray[np.float64] = remembered()
     degraded_sweeps: NDArray[np.int64] = remembered()
+
+    def refuse_untrue(self, saved: Mapping[str, NDArray[Any]]) -> None:
+        """Raise StateError when a ring's macro-cell does not exist."""
+        if (saved["ring_cell"] >= np.uint64(len(self.level))).any():
+            raise StateError("ring_cell: a macro-cell that does not exist")
 
     @property
     def counters(self) -> dict[str, int]:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pipeline.chain import RadarChain
+from pipeline.detect import Detector
+from pipeline.detect.adaptive import Adaptive
 from pipeline.detect.hybrid import Hybrid
 from pipeline.extract.manhattan import Manhattan
 from pipeline.state import StateError
@@ -113,9 +116,118 @@ def test_a_state_of_other_parts_or_formats_is_refused() -> None:
     with pytest.raises(StateError, match=r"no 'chain\.rows'"):
         chain().restore({k: v for k, v in saved.items() if k != "chain.rows"})
     with pytest.raises(StateError, match="belongs to"):
-        chain().restore({**saved, "chain.parts": np.array(["Other", "Manhattan"])})
+        chain().restore({**saved, "chain.detect": np.array("Other()")})
     with pytest.raises(StateError, match="no 'level'"):
         chain().restore({k: v for k, v in saved.items() if k != "detect.level"})
+
+
+def numbered_from_0(these: list[Sweeps]) -> list[Sweeps]:
+    first = these[0].scan
+    return [replace(one, scan=one.scan - first) for one in these]
+
+
+@pytest.mark.parametrize("detector", [Hybrid(), Adaptive()], ids=["hybrid", "adaptive"])
+def test_what_was_learned_is_resumed_with_rows_that_begin_anew(detector: Detector) -> None:
+    these = blocks(17)
+    at = 14 * len(EIGHTHS)
+    straight = RadarChain(site(), 3, detector, Manhattan())
+    run(straight, these[:at])
+    saved = straight.save()
+    wanted = [one.plots for one in run(straight, these[at:])]
+    again = RadarChain(site(), 3, detector, Manhattan(min_cells=1, max_open_runs=999))
+    again.resume(saved)
+    assert set(again.counters.values()) == {0}
+    got = [one.plots for one in run(again, numbered_from_0(these[at:]))]
+    assert sum(len(one) for one in got[: len(EIGHTHS)]) > 0
+    for a, b in zip(wanted, got, strict=True):
+        assert_same_plots(a, replace(b, scan=b.scan + 14))
+    assert again.counters["late_sweeps"] == 0
+    twice = RadarChain(site(), 3, detector, Manhattan())
+    twice.resume(again.save())
+    assert len(plots_of(run(twice, numbered_from_0(these[at : at + len(EIGHTHS)])))) > 0
+
+
+def test_a_state_from_the_middle_of_a_turn_is_resumed_too() -> None:
+    these = blocks(17)
+    at = 13 * len(EIGHTHS) + 3
+    first = RadarChain(site(), 3, Adaptive(), Manhattan())
+    run(first, these[:at])
+    again = RadarChain(site(), 3, Adaptive(), Manhattan())
+    again.resume(first.save())
+    assert len(plots_of(run(again, numbered_from_0(these[14 * len(EIGHTHS) :])))) > 0
+
+
+def test_what_cannot_be_resumed_is_refused_and_changes_nothing() -> None:
+    these = blocks()
+    saved = chain()
+    run(saved, these[:12])
+    kept = saved.save()
+    cold = chain().save()
+    for wrong, words in (
+        ({**kept, "chain.site": np.array("elsewhere")}, "another site"),
+        ({**kept, "chain.map": np.array("12345678")}, "another map"),
+        ({**kept, "chain.detect": np.array("Hybrid(pfa=0.1)")}, "another detect"),
+        ({**kept, "chain.rows": np.array([1, 2])}, "chain.rows"),
+        ({**kept, "chain.rows": np.array([2**60, 0, 0])}, "cannot be true"),
+        ({**kept, "chain.rows": np.array(["a", "b", "c"])}, "chain.rows"),
+        ({**kept, "detect.ring_cell": kept["detect.ring_cell"] + 10**6}, "macro-cell"),
+        ({**kept, "detect.level": kept["detect.level"].astype(np.float32)}, "level"),
+        ({}, "chain.rows"),
+    ):
+        target = chain()
+        with pytest.raises(StateError, match=words):
+            target.resume(wrong)
+        for name, array in target.save().items():
+            np.testing.assert_array_equal(array, cold[name])
+    with pytest.raises(StateError, match="not begun"):
+        saved.resume(kept)
+
+
+def test_a_chain_takes_over_between_two_blocks() -> None:
+    these = blocks(8)
+    at = 4 * len(EIGHTHS)
+    old = chain()
+    before = run(old, these[:at])
+    new = RadarChain(site(), 3, Adaptive(learn_scans=2), Manhattan())
+    assert not new.detects_like(old)
+    assert new.scans_to_learn == 2
+    for one in these[2 * len(EIGHTHS) : at]:
+        new.learn(one)
+    last = old.flush()
+    new.take_over(old)
+    after = run(new, these[at:])
+    assert after[0].closed_from == before[-1].closed_to
+    for one, other in itertools.pairwise(after):
+        assert other.closed_from == one.closed_to
+    assert len(plots_of(after[: len(EIGHTHS)])) > 0, "it has learned beside the other, and detects at once"
+    assert new.newest is old.newest
+    counted, stood = new.counters, old.counters
+    assert counted["sweeps"] == 8 * SMALL.azimuths
+    assert counted["plots"] == stood["plots"] + sum(len(one.plots) for one in after)
+    assert stood["plots"] == sum(len(one.plots) for one in before) + len(last.plots)
+    assert all(counted[name] >= count for name, count in stood.items())
+    assert new.process(these[at - 1]).plots.time.size == 0
+    assert new.counters["late_blocks"] == 1
+
+
+def test_the_same_detector_goes_on_with_what_it_knows() -> None:
+    these = blocks(8)
+    at = 4 * len(EIGHTHS)
+    straight, old = chain(), chain()
+    run(old, these[:at])
+    run(straight, these[:at])
+    old.flush()
+    new = RadarChain(site(), 3, Hybrid(), Manhattan(min_cells=2))
+    assert new.detects_like(old)
+    new.take_over(old)
+    run(new, these[at:])
+    run(straight, these[at:])
+    for name, array in straight.save().items():
+        if name.startswith("detect."):
+            np.testing.assert_array_equal(array, new.save()[name])
+    elsewhere = RadarChain(replace(site(), east=5.0), 3, Hybrid(), Manhattan())
+    with pytest.raises(ValueError, match="take over"):
+        elsewhere.take_over(new)
 
 
 def test_a_flood_is_seen() -> None:
