@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from app.settings import NodeSettings, PartSettings, RadarSettings, Settings, SettingsError
 from pipeline import parts
@@ -56,6 +59,10 @@ def node_site(node: NodeSettings, airport: Airport) -> NodeSite:
     )
 
 
+FRONT_END = {"detect": "detector", "extract": "extractor"}
+"""The verbs whose parts work on one radar's video, and what `RadarChain` calls the part."""
+
+
 def radar_chain(
     site: RadarSite,
     index: int,
@@ -63,10 +70,32 @@ def radar_chain(
     airport: Airport | None,
     clock: Callable[[], float] | None = None,
 ) -> RadarChain:
-    """The chosen detector and extractor on one radar's video."""
+    """The chosen parts on one radar's video."""
     surface = surface_of_radar(airport, site) if airport is not None else None
-    detector, extractor = _part("detect", settings.parts.detect), _part("extract", settings.parts.extract)
-    return RadarChain(site, index, detector, extractor, surface=surface, clock=clock)
+    return chain_of(site, index, build_parts(settings, FRONT_END), surface, clock)
+
+
+def chain_of(
+    site: RadarSite,
+    index: int,
+    made: Mapping[str, Any],
+    surface: NDArray[np.uint8] | None,
+    clock: Callable[[], float] | None = None,
+) -> RadarChain:
+    """A chain of parts that are built. made: the part of each verb of FRONT_END."""
+    return RadarChain(
+        site, index, **{word: made[verb] for verb, word in FRONT_END.items()}, surface=surface, clock=clock
+    )
+
+
+def build_parts(settings: Settings, verbs: Iterable[str]) -> dict[str, Any]:
+    """The part that the settings choose for each verb. Raises SettingsError."""
+    return {verb: _part(verb, getattr(settings.parts, verb)) for verb in verbs}
+
+
+def parts_of(chain: RadarChain) -> dict[str, Any]:
+    """The part of each verb of FRONT_END."""
+    return {verb: getattr(chain, word) for verb, word in FRONT_END.items()}
 
 
 def surface_engine(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -45,6 +45,27 @@ class Video:
     time: float
 
 
+class WrongParts(ValueError):
+    """The parts that are asked for do not exist, or not with these settings; the message names the nearest word."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrontEnd:
+    """What works on one radar's video. running, next: of each verb the part, its name and every setting.
+
+    next: what learns beside and takes over after scans_left turns; None when nothing does. plots_a_scan, ms_a_turn:
+    of the newest whole turn, the time by stage. cut: what was left out in the last 10 s, by counter.
+    """
+
+    radar: str
+    running: dict[str, dict[str, Any]]
+    next: dict[str, dict[str, Any]] | None
+    scans_left: int | None
+    plots_a_scan: int
+    ms_a_turn: dict[str, float]
+    cut: dict[str, int]
+
+
 PictureListener = Callable[[Picture, tuple[AlertChange, ...]], None]
 """Called in the surface thread for every new picture; must return at once and must not raise."""
 
@@ -72,6 +93,15 @@ class Service(Protocol):
 
     def video(self, radar: str) -> Video:
         """The newest turn of a radar. Raises UnknownId, or Refused when it has not been heard yet."""
+
+    def front_end(self, radar: str) -> FrontEnd:
+        """What works on a radar's video. Raises UnknownId; Refused while the service starts."""
+
+    def choose_parts(self, radar: str, wanted: Mapping[str, Mapping[str, Any]]) -> FrontEnd:
+        """Have other parts work on a radar's video; verbs left out stay. wanted: of each verb its name and settings.
+
+        Builds and compiles in the calling thread, so it may take a while. Raises UnknownId, WrongParts, Refused.
+        """
 
     def acknowledge(self, alert: int, by: str) -> Alert:
         """Acknowledge a live alert. Raises UnknownId; Refused when it is cleared."""

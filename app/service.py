@@ -5,17 +5,20 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from app.assembly import check_parts, node_site, radar_chain, radar_site, surface_engine
-from app.contract import PictureListener, Readiness, Refused, UnknownId, Video
+from app.assembly import FRONT_END, build_parts, chain_of, check_parts, node_site, radar_site, surface_engine
+from app.contract import FrontEnd, PictureListener, Readiness, Refused, UnknownId, Video
 from app.ingest.octets import OctetIntake
 from app.ingest.udp import VideoReceiver
+from app.runtime.front_end import FrontEndSwitch
 from app.runtime.radar_worker import RadarWorker
+from app.runtime.state_keeper import StateKeeper
 from app.runtime.surface_worker import SurfaceWorker
 from app.settings import Settings
 from pipeline.airport.model import Airport
+from pipeline.airport.surfaces import surface_of_radar
 from pipeline.picture import Alert, AlertChange, Picture, RunwayState, SensorState, Visibility
 from pipeline.sites import RadarSite
 from pipeline.tables import NodeEvents, TargetReports
@@ -44,6 +47,13 @@ class SurfaceService:
         self.extra_sensors: list[Callable[[], SensorState]] = []
         self.keep_node_events: Callable[[NodeEvents], None] = lambda events: None
         self._workers: dict[str, RadarWorker] = {}
+        self._switches: dict[str, FrontEndSwitch] = {}
+        self._keeper = StateKeeper(
+            settings.data_dir / "state",
+            _scene(settings),
+            settings.storage.state_interval_s,
+            settings.storage.state_max_age_s,
+        )
         self._receivers: dict[str, VideoReceiver] = {}
         self._surface: SurfaceWorker | None = None
         self._heard: dict[str, tuple[float, float, int]] = {}
@@ -53,17 +63,24 @@ class SurfaceService:
         }
         self._octets_lock = threading.Lock()
 
-    def prepare(self, first_alert: int = 1) -> None:
-        """Build the chains and the engine and compile every kernel. Raises SettingsError."""
+    def prepare(self, first_alert: int = 1, resume: bool = True) -> None:
+        """Build the chains and the engine and compile every kernel. Raises SettingsError.
+
+        resume: the detectors take up what they had learned before a restart.
+        """
         engine = surface_engine(
             self.settings, self.airport, self.radars, self.nodes, first_alert=first_alert, clock=time.perf_counter
         )
         engine.tracker.warm()
         self._surface = SurfaceWorker(engine, self.sensors, self.settings.limits.rows_queued, self._stage_timings)
         for index, (site, radar) in enumerate(zip(self.radars, self.settings.radars, strict=True)):
-            chain = radar_chain(site, index, self.settings, self.airport, time.perf_counter)
+            ground = surface_of_radar(self.airport, site)
+            chain = chain_of(site, index, build_parts(self.settings, FRONT_END), ground, time.perf_counter)
             chain.warm()
+            if resume:
+                self._keeper.take_up(chain)
             worker = RadarWorker(site, chain, self.settings.limits.blocks_queued, self._surface.inbox.offer)
+            self._switches[site.id] = FrontEndSwitch(worker, index, ground)
             self._workers[site.id] = worker
             if radar.udp is not None:
                 self._receivers[site.id] = VideoReceiver(site, index, radar, worker.put)
@@ -78,6 +95,7 @@ class SurfaceService:
             worker.start()
         for receiver in self._receivers.values():
             receiver.start()
+        self._keeper.start(list(self._workers.values()))
 
     def stop(self) -> None:
         """Close the sockets, work off what waits, end the threads."""
@@ -85,6 +103,7 @@ class SurfaceService:
             receiver.stop()
         for worker in self._workers.values():
             worker.stop()
+        self._keeper.stop()
         if self._surface is not None:
             self._surface.stop()
 
@@ -125,6 +144,14 @@ class SurfaceService:
         if worker.last_time is None:
             raise Refused(f"radar {radar} has not been heard yet")
         return Video(worker.site, worker.chain.newest, worker.last_time)
+
+    def front_end(self, radar: str) -> FrontEnd:
+        """What works on a radar's video."""
+        return self._switch(radar).state()
+
+    def choose_parts(self, radar: str, wanted: Mapping[str, Mapping[str, Any]]) -> FrontEnd:
+        """Have other parts work on a radar's video."""
+        return self._switch(radar).choose(wanted)
 
     def acknowledge(self, alert: int, by: str) -> Alert:
         """Acknowledge a live alert."""
@@ -185,6 +212,14 @@ class SurfaceService:
             raise Refused("the service is still starting")
         return self._surface
 
+    def _switch(self, radar: str) -> FrontEndSwitch:
+        if radar not in self._octets:
+            raise UnknownId(radar)
+        switch = self._switches.get(radar)
+        if switch is None or not self.checks["warm"]:
+            raise Refused("the service is still starting")
+        return switch
+
     def _submit(self, kind: str, table: NodeEvents | TargetReports) -> None:
         if not len(table):
             return
@@ -209,7 +244,12 @@ class SurfaceService:
         if worker is None:
             return SensorState(site.id, "radar", "waiting", None, site.simulated, counters=counters)
         counters.update(worker.counters())
-        return SensorState(site.id, "radar", worker.status, worker.last_time, site.simulated, counters=counters)
+        counters.update(self._keeper.counters(site.id))
+        switch = self._switches[site.id]
+        detail = "; ".join(words for words in (worker.cuts.words(), switch.learning) if words)
+        return SensorState(
+            site.id, "radar", worker.status, worker.last_time, site.simulated, detail, counters, switch.names
+        )
 
     def _feed_state(self, id: str, kind: str, simulated: bool) -> SensorState:
         heard = self._heard.get(id)
@@ -235,3 +275,11 @@ class SurfaceService:
         detail = f"{held_now} conflicts find no room among the alerts" if held_now else ""
         status = "degraded" if held_now else "ok"
         return SensorState("surface", "tracker", status, newest.time if newest else None, False, detail, counters)
+
+
+def _scene(settings: Settings) -> str:
+    """What video a state comes from, besides its radar: the demonstration's ground is another with every seed."""
+    if settings.mode != "demo":
+        return settings.mode
+    demo = settings.demo
+    return f"demo of {demo.traffic}, seed {demo.seed}, {demo.synthetic_targets} synthetic, rain {demo.rain}"

@@ -12,7 +12,8 @@ import pkgutil
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
-from typing import Any
+from types import NoneType, UnionType
+from typing import Any, get_args, get_type_hints
 
 VERBS = ("detect", "extract", "bearing", "associate", "filter", "lifecycle", "classify", "alert")
 """The folders of `pipeline` that hold parts."""
@@ -45,14 +46,27 @@ def build(verb: str, name: str, settings: Mapping[str, Any] | None = None) -> An
     if not is_dataclass(kind):
         raise PartError(f"{verb} part {name!r} is not a dataclass")
     allowed = [f.name for f in fields(kind)]
+    kinds = get_type_hints(kind)
     given = dict(settings or {})
-    for key in given:
+    for key, value in given.items():
         if key not in allowed:
             raise PartError(f"{verb} part {name!r} has no setting {key!r}{_nearest(key, allowed)}")
+        given[key] = _of_type(value, kinds[key], f"{verb} part {name!r}: {key}")
     try:
         return kind(**given)
     except (TypeError, ValueError) as error:
         raise PartError(f"{verb} part {name!r}: {error}") from error
+
+
+def _of_type(value: Any, wanted: Any, what: str) -> Any:
+    """The value, where its type is a plain one: an integer also serves as a number. Raises PartError."""
+    kinds = get_args(wanted) if isinstance(wanted, UnionType) else (wanted,)
+    if not set(kinds) <= {bool, int, float, str, NoneType} or type(value) in kinds:
+        return value
+    if float in kinds and type(value) is int:
+        return float(value)
+    names = " or ".join("none" if kind is NoneType else kind.__name__ for kind in kinds)
+    raise PartError(f"{what} must be {names}, not {value!r}")
 
 
 def _nearest(word: str, among: Any) -> str:

@@ -90,7 +90,8 @@ class RunwayState:
 class SensorState:
     """The health of one sensor. status: "ok", "degraded", "silent" or "waiting" (nothing heard since start).
 
-    counters: what it delivered and what was dropped, by reason; they only grow.
+    counters: what it delivered and what was dropped, by reason; they only grow. parts: of a radar, the methods that
+    work on its video, by verb.
     """
 
     id: str
@@ -100,6 +101,7 @@ class SensorState:
     simulated: bool = False
     detail: str = ""
     counters: dict[str, int] = field(default_factory=dict)
+    parts: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from app.api.intake import intake_router
 from app.api.metrics import metrics_router
 from app.api.middleware import Guard
 from app.api.pages import pages_router
+from app.api.parts import parts_router
 from app.api.readsb import readsb_router
 from app.api.surveillance import surveillance_router
 from app.api.video import video_router
@@ -66,6 +67,7 @@ def create_app(service: Service, *, hub: Hub, store: Store | None, view3d_router
     app.include_router(_operation_router(service))
     app.include_router(surveillance_router(context))
     app.include_router(video_router(context))
+    app.include_router(parts_router(context))
     app.include_router(intake_router(context))
     app.include_router(readsb_router(context))
     app.include_router(metrics_router(context))

@@ -27,7 +27,7 @@ def warmup() -> None:
     settings = demo_settings(load())
     service = SurfaceService(settings, *load_airport(settings.airport))
     with console.status("compiling the kernels of the chain and the tracker"):
-        service.prepare()
+        service.prepare(resume=False)
     with console.status("compiling the kernels of the simulator"):
         warm_simulator()
     console.print(f"every kernel is compiled ({time.perf_counter() - begun:.1f} s)")

@@ -25,6 +25,7 @@ class BlockQueue:
         self._blocks: deque[Sweeps] = deque()
         self._ready = threading.Condition()
         self._closed = False
+        self._woken = False
 
     def put(self, block: Sweeps) -> None:
         """Append a block; never waits."""
@@ -36,12 +37,21 @@ class BlockQueue:
                 self._drop_oldest_scan()
             self._ready.notify()
 
-    def get(self) -> Sweeps:
-        """The oldest block; waits for one. Raises Closed."""
+    def wake(self) -> None:
+        """Let `get` return even without a block."""
+        with self._ready:
+            self._woken = True
+            self._ready.notify()
+
+    def get(self) -> Sweeps | None:
+        """The oldest block; waits for one. None when woken without one. Raises Closed."""
         with self._ready:
             while not self._blocks:
                 if self._closed:
                     raise Closed
+                if self._woken:
+                    self._woken = False
+                    return None
                 self._ready.wait()
             return self._blocks.popleft()
 

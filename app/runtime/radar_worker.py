@@ -5,8 +5,13 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
+from app.runtime.cuts import Cuts
 from app.runtime.queues import BlockQueue, Closed
 from pipeline.chain import RadarChain
 from pipeline.sites import RadarSite
@@ -14,19 +19,51 @@ from pipeline.tables import SectorPlots, Sweeps
 
 log = logging.getLogger(__name__)
 
+Result = TypeVar("Result")
+
+
+@dataclass
+class Turn:
+    """What one turn cost and gave. seconds: of each stage."""
+
+    scan: int = -1
+    plots: int = 0
+    seconds: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass
+class Successor:
+    """A chain that is to take over. done: told whether it did. learns_from: the scan with which it begins to learn
+    beside the running one; None before the first block. due: the scan with which it takes over."""
+
+    chain: RadarChain
+    done: Callable[[bool], None]
+    learns_from: int | None = None
+    due: int | None = None
+
 
 class RadarWorker:
-    """Runs a chain on the blocks put into its queue and hands each sector on."""
+    """Runs a chain on the blocks put into its queue and hands each sector on.
+
+    Only its thread touches the chain: what others want of it goes through `ask` and `succeed`.
+    """
 
     def __init__(self, site: RadarSite, chain: RadarChain, limit: int, deliver: Callable[[SectorPlots], bool]) -> None:
         self.site = site
         self.chain = chain
         self.queue = BlockQueue(limit)
+        self.cuts = Cuts()
+        self.turn = Turn()
         self.last_heard: float | None = None
         self.last_time: float | None = None
         self.failures = 0
         self.undelivered = 0
+        self.successions = 0
+        self.scans_left: int | None = None
         self._deliver = deliver
+        self._turning = Turn()
+        self._successor: Successor | None = None
+        self._orders: deque[Callable[[], None]] = deque()
         self._thread = threading.Thread(target=self._run, name=f"radar-{site.id}", daemon=True)
 
     def start(self) -> None:
@@ -44,6 +81,49 @@ class RadarWorker:
         if self._thread.is_alive():
             self._thread.join(5.0)
 
+    def ask(self, work: Callable[[RadarChain], Result]) -> Future[Result]:
+        """Do `work` with the chain between two blocks; in the caller's thread when the radar's does not run."""
+        answer: Future[Result] = Future()
+
+        def order() -> None:
+            if not answer.set_running_or_notify_cancel():
+                return
+            try:
+                answer.set_result(work(self.chain))
+            except Exception as error:
+                answer.set_exception(error)
+
+        if self.alive:
+            self._orders.append(order)
+            self.queue.wake()
+        else:
+            order()
+        return answer
+
+    def succeed(self, chain: RadarChain | None, done: Callable[[bool], None]) -> None:
+        """Have `chain` take over, and `done` told when it has, or cannot; None: the one that learns is forgotten.
+
+        A chain with the same detector takes over at once, with what that has learned. Another first learns beside the
+        running one for as many turns as it detects nothing in. Until it is done a later call takes its place.
+        """
+
+        def order() -> None:
+            self._successor = None if chain is None else Successor(chain, done)
+            self.scans_left = None
+            if chain is None:
+                return
+            at_once = chain.detects_like(self.chain) or self.last_time is None or not chain.scans_to_learn
+            if at_once:
+                self._take_over(self._successor)
+            else:
+                self.scans_left = chain.scans_to_learn
+
+        if self.alive:
+            self._orders.append(order)
+            self.queue.wake()
+        else:
+            order()
+
     @property
     def alive(self) -> bool:
         """The thread runs."""
@@ -54,9 +134,9 @@ class RadarWorker:
         """The health word of SensorState."""
         if self.last_heard is None:
             return "waiting"
-        if time.monotonic() - self.last_heard > 3 * self.site.video.period_s:
+        if time.monotonic() - self.last_heard > 3 * self.site.video.period_s or not self.alive:
             return "silent"
-        return "ok" if self.alive else "silent"
+        return "degraded" if self.cuts.lately() else "ok"
 
     def counters(self) -> dict[str, int]:
         """What was worked on and what was not."""
@@ -66,6 +146,7 @@ class RadarWorker:
             "queue_dropped_sweeps": self.queue.dropped_sweeps,
             "sectors_undelivered": self.undelivered,
             "block_failures": self.failures,
+            "parts_changed": self.successions,
         }
 
     def _run(self) -> None:
@@ -74,13 +155,67 @@ class RadarWorker:
                 block = self.queue.get()
             except Closed:
                 return
-            try:
-                sector = self.chain.process(block)
-            except Exception:
-                self.failures += 1
-                log.exception("radar %s: a block of scan %d could not be worked on", self.site.id, block.scan)
-                continue
-            if len(block):
-                self.last_time = float(block.time[-1])
-            if not self._deliver(sector):
-                self.undelivered += 1
+            while self._orders:
+                self._attempt(self._orders.popleft())
+            if block is not None:
+                self._work(block)
+
+    def _work(self, block: Sweeps) -> None:
+        self._attempt(lambda: self._bring_up(block))
+        try:
+            sector = self.chain.process(block)
+        except Exception:
+            self.failures += 1
+            log.exception("radar %s: a block of scan %d could not be worked on", self.site.id, block.scan)
+            return
+        if len(block):
+            self.last_time = float(block.time[-1])
+        self._account(block.scan, sector)
+        self._hand_on(sector)
+
+    def _attempt(self, work: Callable[[], Any]) -> None:
+        try:
+            work()
+        except Exception:
+            self.failures += 1
+            failed, self._successor, self.scans_left = self._successor, None, None
+            log.exception("radar %s: other parts could not take over; those that ran stay", self.site.id)
+            if failed is not None:
+                failed.done(False)
+
+    def _bring_up(self, block: Sweeps) -> None:
+        """Let the successor learn from the block, or take over when it has learned enough."""
+        successor = self._successor
+        if successor is None or not len(block):
+            return
+        if successor.learns_from is None or successor.due is None:
+            successor.learns_from = block.scan + 1
+            successor.due = successor.learns_from + successor.chain.scans_to_learn
+        self.scans_left = max(1, successor.due - max(block.scan, successor.learns_from))
+        if block.scan >= successor.due:
+            self._take_over(successor)
+        elif block.scan >= successor.learns_from:
+            successor.chain.learn(block)
+
+    def _take_over(self, successor: Successor | None) -> None:
+        if successor is None:
+            return
+        if self.last_time is not None:
+            self._hand_on(self.chain.flush())
+        successor.chain.take_over(self.chain)
+        self.chain = successor.chain
+        self.successions += 1
+        self._successor, self.scans_left = None, None
+        successor.done(True)
+
+    def _hand_on(self, sector: SectorPlots) -> None:
+        if not self._deliver(sector):
+            self.undelivered += 1
+
+    def _account(self, scan: int, sector: SectorPlots) -> None:
+        self.cuts.note({**self.chain.counters, "queue_dropped_sweeps": self.queue.dropped_sweeps})
+        if scan != self._turning.scan:
+            self.turn, self._turning = self._turning, Turn(scan)
+        self._turning.plots += len(sector.plots)
+        for stage, seconds in self.chain.timings.items():
+            self._turning.seconds[stage] = self._turning.seconds.get(stage, 0.0) + seconds

@@ -139,7 +139,8 @@ def test_what_was_learned_is_resumed_with_rows_that_begin_anew(detector: Detecto
     assert set(again.counters.values()) == {0}
     got = [one.plots for one in run(again, numbered_from_0(these[at:]))]
     assert sum(len(one) for one in got[: len(EIGHTHS)]) > 0
-    for a, b in zip(wanted, got, strict=True):
+    # the target across north was begun before the restart
+    for a, b in list(zip(wanted, got, strict=True))[2:]:
         assert_same_plots(a, replace(b, scan=b.scan + 14))
     assert again.counters["late_sweeps"] == 0
     twice = RadarChain(site(), 3, detector, Manhattan())
@@ -196,8 +197,7 @@ def test_a_chain_takes_over_between_two_blocks() -> None:
     last = old.flush()
     new.take_over(old)
     after = run(new, these[at:])
-    assert after[0].closed_from == before[-1].closed_to
-    for one, other in itertools.pairwise(after):
+    for one, other in itertools.pairwise([*before, last, *after]):
         assert other.closed_from == one.closed_to
     assert len(plots_of(after[: len(EIGHTHS)])) > 0, "it has learned beside the other, and detects at once"
     assert new.newest is old.newest

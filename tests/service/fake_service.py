@@ -10,14 +10,17 @@ import contextlib
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from app.contract import PictureListener, Readiness, Refused, UnknownId, Video
+from app.assembly import FRONT_END, build_parts, chain_of
+from app.contract import FrontEnd, PictureListener, Readiness, Refused, UnknownId, Video
+from app.runtime.front_end import FrontEndSwitch
+from app.runtime.radar_worker import RadarWorker, Turn
 from app.settings import RadarSettings, Settings
 from pipeline.airport.model import Airport
 from pipeline.picture import Alert, AlertChange, AlertTarget, Picture, RunwayState, SensorState, Visibility
@@ -67,6 +70,14 @@ def lines_of(airport: Airport, rng: np.random.Generator) -> list[np.ndarray[Any,
     return made
 
 
+def parts_on(site: RadarSite, index: int) -> FrontEndSwitch:
+    """The real parts of a radar that never turns, with the figures of a turn."""
+    chain = chain_of(site, index, build_parts(Settings(), FRONT_END), None)
+    worker = RadarWorker(site, chain, 4, lambda _: True)
+    worker.turn = Turn(7, 214, {"keep": 0.0012, "detect": 0.0184, "extract": 0.0031})
+    return FrontEndSwitch(worker, index, None)
+
+
 class FakeService:
     """Implements `app.contract.Service`; `start` moves the targets in a thread at `rate_hz` pictures a second."""
 
@@ -91,6 +102,8 @@ class FakeService:
             ),
             RadarSite("smr-2", 500.0, 0.0, 22.0, VideoFormat(azimuths=1024, ranges=512, range_step_m=6.0)),
         )
+        self._switches = {site.id: parts_on(site, index) for index, site in enumerate(self.radars)}
+        self.cut: dict[str, str] = {}
         self.nodes = (NodeSite("node-1", -1450.0, -560.0, 2.6, hold="hold-w1", runway="06/24", simulated=True),)
         self.rate_hz = rate_hz
         self.node_events: list[NodeEvents] = []
@@ -275,11 +288,15 @@ class FakeService:
         now = time.time()
         return (
             SensorState(
-                "smr-1", "radar", "ok", now, True, counters={"sweeps": 4096, "lost": 3, "duplicate": 0, "late": 1}
+                "smr-1", "radar", "degraded" if "smr-1" in self.cut else "ok", now, True, self.cut.get("smr-1", ""),
+                counters={"sweeps": 4096, "lost": 3, "duplicate": 0, "late": 1}, parts=self._switches["smr-1"].names,
             ),
-            SensorState("smr-2", "radar", "silent", now - 60, False, "nothing heard for 60 s", {"sweeps": 10}),
+            SensorState(
+                "smr-2", "radar", "silent", now - 60, False, "nothing heard for 60 s", {"sweeps": 10},
+                self._switches["smr-2"].names,
+            ),
             SensorState("nodes", "node", "ok", now, True, counters={"taken": 7}),
-        )
+        )  # fmt: skip
 
     def video(self, radar: str) -> Video:
         site = next((one for one in self.radars if one.id == radar), None)
@@ -298,6 +315,17 @@ class FakeService:
                 if cell < site.video.ranges - 4:
                     amplitude[(row + np.arange(-3, 4)) % site.video.azimuths, cell - 3 : cell + 4] = 220
         return Video(site, amplitude, picture.time if picture else 0.0)
+
+    def front_end(self, radar: str) -> FrontEnd:
+        return self._switch(radar).state()
+
+    def choose_parts(self, radar: str, wanted: Mapping[str, Mapping[str, Any]]) -> FrontEnd:
+        return self._switch(radar).choose(wanted)
+
+    def _switch(self, radar: str) -> FrontEndSwitch:
+        if radar not in self._switches:
+            raise UnknownId(radar)
+        return self._switches[radar]
 
     def acknowledge(self, alert: int, by: str) -> Alert:
         with self._lock:
