@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq, newton
-from scipy.special import loggamma
+from scipy.special import betaln, gammaln, loggamma
 
 DB = 10 / log(10)
 """Decibels of a natural unit of power ratio."""
@@ -115,6 +115,46 @@ def log_mean_offset_db(
 def mean_offsets_db(pfa: float, db_per_step: float, most: int) -> NDArray[np.float64]:
     """(most + 1) `log_mean_offset_db` of the plain mean of as many amplitudes; of none, infinite."""
     return _by_count(lambda n: log_mean_offset_db(pfa, db_per_step, np.array([1 / n]), np.array([n])), most)
+
+
+@lru_cache(maxsize=64)
+def power_mean_offsets_db(pfa: float, db_per_step: float, most: int) -> NDArray[np.float64]:
+    """(most + 1) decibels to add to the mean power of as many cells of Rayleigh clutter; of none, infinite.
+
+    Pfa = (1 + a / n) ** -n for offset a as a ratio (Rohling 1983), here with the rounding of the amplitudes and of the
+    limit.
+    """
+    rounding = 10 ** ((np.arange(32) + 0.5) / 32 * db_per_step / 10)
+    centred = rounding / 10 ** (db_per_step / 20)
+
+    def excess(log_ratio: float, n: float) -> float:
+        one = (1 / (1 + np.exp(log_ratio) / n * rounding[:, None] * centred)).mean(axis=1)
+        return log(max(float((one**n).mean()), 1e-300)) - log(pfa)
+
+    return _by_count(lambda n: DB * float(brentq(excess, -12.0, 60.0, args=(n,), xtol=1e-9)), most)
+
+
+@lru_cache(maxsize=4096)
+def order_offset_steps(pfa: float, db_per_step: float, cells: float, rank: float) -> float:
+    """Steps to add to the rank-th smallest of so many log amplitudes of Rayleigh clutter.
+
+    Pfa = prod((n - i) / (n - i + T), i < k) for offset T as a ratio (Rohling 1983, equation 35), by gamma functions, so
+    that n and k need not be whole. Level and limit are both whole, so whole offsets alone would miss the probability;
+    the part after the point says what share of the cells is to have one step more.
+    """
+    edges = (np.arange(64) + 0.5) / 64
+
+    def chance(steps: int) -> float:
+        ratio = 10 ** ((steps + edges) * db_per_step / 10)
+        constant = gammaln(cells + 1) - gammaln(cells - rank + 1) - gammaln(rank)
+        return float(np.exp(constant + betaln(cells - rank + 1 + ratio, rank)).mean())
+
+    low, high = -1024, 1024
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if chance(middle) >= pfa else (low, middle)
+    more, less = chance(low), chance(high)
+    return low + (more - pfa) / (more - less) if more > less else float(low)
 
 
 @lru_cache(maxsize=64)

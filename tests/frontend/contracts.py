@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -42,11 +42,13 @@ def mask_of(part: Detector, blocks: list[Sweeps], state: Any) -> tuple[Any, int]
 
 class DetectorContract:
     """Inherit and give make(). scans: enough for the detector to detect. growth_scans: turns after half of which its
-    growth level is settled, and growth_tolerance: how near its share of clutter cells then comes."""
+    growth level is settled, and growth_tolerance: how near its share of clutter cells then comes. flooding: further
+    settings with which noise over the whole scale is a flood."""
 
     scans = 5
     growth_scans = 16
     growth_tolerance = 0.05
+    flooding: ClassVar[dict[str, Any]] = {}
 
     def make(self, **setting: Any) -> Detector:
         raise NotImplementedError
@@ -124,7 +126,7 @@ class DetectorContract:
         frames = rayleigh(rng, (6, SMALL.azimuths, SMALL.ranges), 20.0)
         frames[3:] = rng.integers(0, 255, (3, SMALL.azimuths, SMALL.ranges), dtype=np.uint8)
         frames[5, 40:44, 100:104] = 255
-        part = self.make(max_runs=200)
+        part = self.make(max_runs=200, **self.flooding)
         blocks = strip(frames, SMALL)
         state = part.start(SMALL)
         whole, degraded = mask_of(part, blocks, state)
