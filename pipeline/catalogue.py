@@ -6,20 +6,31 @@ import importlib
 import re
 from dataclasses import MISSING, Field, dataclass, fields
 from functools import cache
-from typing import Any
+from types import NoneType, UnionType
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from pipeline.parts import available
 
-_JSON = {"float": "number", "int": "integer", "bool": "boolean", "str": "string", "None": "null"}
+_JSON = {
+    float: "number",
+    int: "integer",
+    bool: "boolean",
+    str: "string",
+    NoneType: "null",
+    tuple: "array",
+    list: "array",
+}
 
 
 @dataclass(frozen=True)
 class Setting:
-    """One setting of a part. type: as JSON names it. default: None when it has none. about: one line."""
+    """One setting of a part. type: as JSON names it. default: None when it has none. choices: the only values, where
+    these are words. about: one line."""
 
     name: str
     type: str
     default: Any
+    choices: tuple[str, ...]
     about: str
 
 
@@ -50,33 +61,44 @@ def name_of(part: Any) -> str:
 
 def _method(name: str, kind: type[Any]) -> Method:
     written = importlib.import_module(kind.__module__).__doc__ or kind.__doc__ or ""
-    meanings = _meanings(kind)
+    meanings, types = _meanings(kind), get_type_hints(kind)
     settings = tuple(
-        Setting(one.name, _type(one), _default(one), meanings.get(one.name, "")) for one in fields(kind) if one.init
+        Setting(one.name, _type(types[one.name]), _default(one), _choices(types[one.name]), meanings.get(one.name, ""))
+        for one in fields(kind)
+        if one.init
     )
     return Method(name, " ".join(written.strip().split("\n\n")[0].split()), settings)
 
 
 def _meanings(kind: type[Any]) -> dict[str, str]:
-    """What the class's docstring says of each setting: "name: words.", or a sentence with `name` in it."""
+    """What the class's docstring says of each setting: "name: words.", or the first sentence that it is in."""
     text = " ".join((kind.__doc__ or "").split())
-    one = rf"(?:{'|'.join(re.escape(field.name) for field in fields(kind)) or '(?!)'})"
+    one = rf"\b(?:{'|'.join(re.escape(field.name) for field in fields(kind)) or '(?!)'})\b"
     found = list(re.finditer(rf"(?<!\S)({one}(?:(?:, | and ){one})*): ", text))
-    ends = [*(match.start() for match in found[1:]), len(text)]
     made: dict[str, str] = {}
-    for match, end in zip(found, ends, strict=True):
+    for k, match in enumerate(found):
+        end = found[k + 1].start() if k + 1 < len(found) else len(text)
         words = re.split(r"(?<=[^.]\.) (?=[A-Z])", text[match.end() : end].strip())[0].rstrip(".; ")
         for name in re.findall(one, match[1]):
             made.setdefault(name, words)
     for sentence in re.split(r"(?<=[^.]\.) (?=[A-Z])", text):
-        for name in re.findall(rf"`({one})`", sentence):
+        for name in re.findall(one, sentence):
             made.setdefault(name, sentence.rstrip("."))
     return made
 
 
-def _type(field: Field[Any]) -> str:
-    words = [word.strip() for word in str(field.type).split("|")]
-    return " or ".join(_JSON.get(word, "array" if word.startswith(("tuple", "list")) else "object") for word in words)
+def _type(declared: Any) -> str:
+    if isinstance(declared, UnionType):
+        return " or ".join(_type(one) for one in get_args(declared))
+    if get_origin(declared) is Literal:
+        return " or ".join(dict.fromkeys(_JSON.get(type(one), "object") for one in get_args(declared)))
+    return _JSON.get(get_origin(declared) or declared, "object")
+
+
+def _choices(declared: Any) -> tuple[str, ...]:
+    if isinstance(declared, UnionType):
+        return tuple(word for one in get_args(declared) for word in _choices(one))
+    return tuple(str(one) for one in get_args(declared)) if get_origin(declared) is Literal else ()
 
 
 def _default(field: Field[Any]) -> Any:

@@ -311,6 +311,7 @@ class PartSetting(Model):
     name: str
     type: str = Field(description="as JSON names it", examples=["number", "integer or null"])
     default: Any
+    choices: list[str] = Field(description="the only values, where these are words; else empty")
     about: str
 
 

@@ -56,8 +56,11 @@ class Cuts:
             if not cut:
                 self._words, self._words_at = "", float("-inf")
             elif now - self._words_at >= WORDS_EVERY_S:
-                told = [f"{COUNTERS[name][0]}, {count} {COUNTERS[name][1]}" for name, count in cut.items()]
-                self._words, self._words_at = f"{'; '.join(told)} in the last {WINDOW_S:g} s", now
+                told = [
+                    f"{COUNTERS[name][0]}, {count} {COUNTERS[name][1]} in the last {WINDOW_S:g} s"
+                    for name, count in cut.items()
+                ]
+                self._words, self._words_at = "; ".join(told), now
             return self._words
 
     def _lately(self) -> dict[str, int]:
