@@ -7,6 +7,7 @@ input of the mean is limited, and the mean is frozen where something is detected
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
@@ -24,7 +25,7 @@ from pipeline.detect.checks import check_pfa, check_positive, check_start, check
 from pipeline.detect.limits import limits_used
 from pipeline.kernels.bits import borrowed
 from pipeline.kernels.run_cap import CapSettings, detect_row
-from pipeline.state import ArrayState, read_only, remembered
+from pipeline.state import ArrayState, StateError, read_only, remembered
 from pipeline.tables import Detections, Sweeps, VideoFormat
 
 AntiMasking = Literal["none", "limit", "freeze", "both"]
@@ -53,12 +54,17 @@ class ClutterMapState(ArrayState):
     gain: NDArray[np.int32]
     limit_units: int
     tail: NDArray[np.uint8]
+    threshold: NDArray[np.uint8]
+    growth: NDArray[np.uint8]
     level: NDArray[np.uint16] = remembered()
     heard: NDArray[np.int64] = remembered()
-    threshold: NDArray[np.uint8] = remembered()
-    growth: NDArray[np.uint8] = remembered()
     budget: NDArray[np.float64] = remembered()
     degraded_sweeps: NDArray[np.int64] = remembered()
+
+    def refuse_untrue(self, saved: Mapping[str, NDArray[Any]]) -> None:
+        """Raise StateError for sweeps heard less than never."""
+        if (saved["heard"] < 0).any():
+            raise StateError("heard: less than 0 sweeps")
 
     @property
     def counters(self) -> dict[str, int]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numba import njit
@@ -17,71 +17,31 @@ from numpy.typing import NDArray
 
 from pipeline.detect.calibration import estimation_loss_db, threshold_offset_db
 from pipeline.detect.checks import check_pfa, check_positive, check_start, check_whole
+from pipeline.detect.hybrid_map import HybridMapState, detect_in_map_cells
 from pipeline.detect.limits import limits_used
-from pipeline.kernels.bits import add_pairs, bits_above, bits_of_row, borrowed, count_runs
-from pipeline.kernels.run_cap import CapSettings, fit_row
+from pipeline.detect.macro_cells import STRIPE_ROWS, MacroCells, MapCells
+from pipeline.kernels.bits import add_pairs, bits_above, borrowed, count_runs
+from pipeline.kernels.run_cap import CapSettings, fit_row, grow_row
 from pipeline.state import ArrayState, StateError, read_only, remembered
 from pipeline.tables import Detections, Sweeps, VideoFormat
 
-STRIPE_ROWS = 8
-"""Macro-cells are made of stripes of this many rows (fewer where a macro-cell itself has fewer)."""
+Cells = Literal["square", "map"]
 
 PAIR_ROWS = 128
 """Rows whose sums of two bytes fit 16 bits."""
 
 
-@dataclass(frozen=True)
-class MacroCells:
-    """The polar grid of macro-cells, each as near to square as the grid lets it be, in rings of whole groups of 8 range
-    cells.
-
-    groups: (rings + 1) first group of each ring. first: (rings) index of each ring's macro-cell at north; clockwise
-    from there they are counted on. until: (cells) stripe after each macro-cell's last. rows, cells: (cells) azimuth
-    rows and radar cells.
-    """
-
-    stripe_rows: int
-    groups: NDArray[np.uint64]
-    first: NDArray[np.uint64]
-    until: NDArray[np.int64]
-    rows: NDArray[np.float64]
-    cells: NDArray[np.float64]
-
-    @classmethod
-    def build(cls, video: VideoFormat, size_m: float) -> MacroCells:
-        """Macro-cells of about size_m by size_m metres."""
-        all_groups = -(-video.ranges // 8)
-        depth = max(1, round(size_m / video.range_step_m / 8))
-        rings = max(1, round(all_groups / depth))
-        groups = np.array([*(np.arange(rings) * depth), all_groups])
-        edges = np.minimum(8 * groups, video.ranges)
-        middle = video.first_range_m + video.range_step_m * (edges[:-1] + edges[1:] - 1) / 2
-        wanted = np.maximum(2 * np.pi * middle / size_m, 1.0)
-        stripe_rows = int(np.clip(video.azimuths / wanted.max() / 2, 1, STRIPE_ROWS))
-        stripes = -(-video.azimuths // stripe_rows)
-        bands = np.clip(np.rint(wanted), 1, stripes).astype(np.int64)
-        until = [(np.arange(n) + 1) * stripes // n for n in bands]
-        rows = [np.diff(np.minimum(one * stripe_rows, video.azimuths), prepend=0) for one in until]
-        return cls(
-            stripe_rows,
-            groups.astype(np.uint64),
-            np.concatenate([[0], np.cumsum(bands)[:-1]]).astype(np.uint64),
-            np.concatenate(until).astype(np.int64),
-            np.concatenate(rows).astype(np.float64),
-            np.concatenate([one * w for one, w in zip(rows, np.diff(edges), strict=True)]).astype(np.float64),
-        )
-
-
 @dataclass(eq=False, kw_only=True)
 class HybridState(ArrayState):
     """level, weight: log mean in steps and scans behind it, of each macro-cell. The rest is the macro-cells being
-    swept; threshold and growth: limits of each cell of the row, growth empty when no growth is asked for."""
+    swept; threshold and growth: limits of each cell of the row."""
 
     cells: MacroCells
     azimuths: int
     offset_steps: float
     loss_steps: float
     growth_steps: float
+    grows: bool
     tail: NDArray[np.uint8]
     level: NDArray[np.float64] = remembered()
     weight: NDArray[np.float64] = remembered()
@@ -112,16 +72,20 @@ class Hybrid:
     """A cell is detected when its log amplitude exceeds its macro-cell's remembered log mean by a constant.
 
     pfa: false alarm probability in Rayleigh clutter, held including the 8-bit rounding and the error of the mean
-    itself. macro_cell_m: side of the (nearly square) macro-cells. memory: scans of the recursive mean (feedback 1 -
-    1/memory); until then it is the plain mean of the scans seen. learn_scans: scans before a macro-cell detects
-    anything: with 1, the first scan only learns and scan 2 detects with the full Pd. max_runs: cap on runs of detected
-    cells a turn; above it the rows concerned get a higher threshold, just as high as needed (`Detections.degraded`,
-    counted). A macro-cell within the offset of full scale detects nothing; without any echo (level 0) the offset alone
-    is the threshold. growth_db counts from the same mean; a degraded row grows nothing, so that a flood stays bounded.
+    itself. macro_cell_m: side of the (nearly square) macro-cells. cells: "square", or "map" to cut the squares by the
+    kinds of surface of the airport map, small pieces put together with others of their kind. memory: scans of the
+    recursive mean (feedback 1 - 1/memory); until then it is the plain mean of the scans seen. learn_scans: scans before
+    a macro-cell detects anything: with 1, the first scan only learns and scan 2 detects with the full Pd. max_runs: cap
+    on runs of detected cells a turn; above it the rows concerned get a higher threshold, just as high as needed
+    (`Detections.degraded`, counted).
+
+    A macro-cell within the offset of full scale detects nothing; without any echo (level 0) the offset alone is the
+    threshold. growth_db counts from the same mean; a degraded row grows nothing, so that a flood stays bounded.
     """
 
     pfa: float = 1e-6
     macro_cell_m: float = 100.0
+    cells: Cells = "square"
     memory: int = 64
     learn_scans: int = 1
     max_runs: int = 40_000
@@ -129,74 +93,92 @@ class Hybrid:
     def __post_init__(self) -> None:
         check_pfa(self.pfa)
         check_positive(macro_cell_m=self.macro_cell_m)
+        if self.cells not in get_args(Cells):
+            raise ValueError(f"cells must be one of {', '.join(get_args(Cells))}")
         check_whole(memory=self.memory, learn_scans=self.learn_scans, max_runs=self.max_runs)
 
     def start(
         self, video: VideoFormat, surface: NDArray[np.uint8] | None = None, growth_db: float | None = None
-    ) -> HybridState:
-        """The state before the first sweep. surface is not used: the macro-cells are squares."""
+    ) -> HybridState | HybridMapState:
+        """The state before the first sweep. surface is used for cells = "map" only; without it, all is of one kind."""
         check_start(video, surface, growth_db)
+        independent = min(1.0, video.azimuth_step_rad / video.beamwidth_rad)
+        rule: dict[str, Any] = {
+            "azimuths": video.azimuths,
+            "offset_steps": threshold_offset_db(self.pfa, video.db_per_step) / video.db_per_step,
+            "loss_steps": estimation_loss_db(self.pfa, video.db_per_step) / video.db_per_step / independent,
+            "growth_steps": (growth_db or 0.0) / video.db_per_step,
+            "grows": growth_db is not None,
+            "tail": np.zeros(64, np.uint8),
+            "threshold": np.full(64 * video.words, 255, np.uint8),
+            "growth": np.full(64 * video.words, 255, np.uint8),
+            "budget": np.array([CapSettings.of(self.max_runs, video.azimuths).depth]),
+            "degraded_sweeps": np.zeros(1, np.int64),
+        }
+        if self.cells == "map":
+            ground = np.zeros((video.azimuths, video.ranges), np.uint8) if surface is None else surface
+            return HybridMapState.begin(MapCells.build(video, ground, self.macro_cell_m), rule)
         cells = MacroCells.build(video, self.macro_cell_m)
         rings, many = len(cells.first), len(cells.rows)
-        independent = min(1.0, video.azimuth_step_rad / video.beamwidth_rad)
         return HybridState(
+            **rule,
             cells=cells,
-            azimuths=video.azimuths,
-            offset_steps=threshold_offset_db(self.pfa, video.db_per_step) / video.db_per_step,
-            loss_steps=estimation_loss_db(self.pfa, video.db_per_step) / video.db_per_step / independent,
-            growth_steps=(growth_db or 0.0) / video.db_per_step,
-            tail=np.zeros(64, np.uint8),
             level=np.zeros(many),
             weight=np.zeros(many),
-            threshold=np.full(64 * video.words, 255, np.uint8),
-            growth=np.full(0 if growth_db is None else 64 * video.words, 255, np.uint8),
             pair_sums=np.zeros(32 * video.words, np.uint16),
             ring_sums=np.zeros(rings, np.int64),
             ring_rows=np.zeros(rings, np.int64),
             ring_pending=np.zeros(rings, np.int64),
             ring_cell=cells.first.copy(),
             cursor=np.array([-1, 0, -1], np.int64),
-            budget=np.array([CapSettings.of(self.max_runs, video.azimuths).depth]),
-            degraded_sweeps=np.zeros(1, np.int64),
         )
 
-    def __call__(self, sweeps: Sweeps, state: HybridState) -> Detections:
+    def __call__(self, sweeps: Sweeps, state: HybridState | HybridMapState) -> Detections:
         """The detections of the block."""
         mask = np.empty((len(sweeps), state.threshold.size // 64), np.uint64)
-        growth = np.empty((len(sweeps), state.growth.size // 64), np.uint64)
+        growth = np.empty(mask.shape if state.grows else (0, 0), np.uint64)
         before = int(state.degraded_sweeps[0])
         cap = CapSettings.of(self.max_runs, state.azimuths)
-        cells = state.cells
-        _detect(
-            read_only(sweeps.amplitude),
-            read_only(sweeps.row, np.int64),
-            sweeps.scan,
-            (mask, growth),
-            cells.stripe_rows,
-            (cells.groups, cells.first, cells.until, cells.cells, cells.rows),
-            (state.offset_steps, state.loss_steps, float(self.memory), self.learn_scans - 0.5, state.growth_steps),
-            (cap.refill, cap.depth),
-            (
-                state.level,
-                state.weight,
-                state.threshold.view(np.uint64),
-                state.pair_sums.view(np.uint64),
-                state.growth.view(np.uint64),
-            ),
-            (
-                state.ring_sums,
-                state.ring_rows,
-                state.ring_pending,
-                state.ring_cell,
-                state.cursor,
-            ),
-            (state.budget, state.degraded_sweeps),
-            state.tail,
+        rule = (
+            state.offset_steps,
+            state.loss_steps,
+            float(self.memory),
+            self.learn_scans - 0.5,
+            state.growth_steps,
+            state.grows,
         )
+        block = read_only(sweeps.amplitude), read_only(sweeps.row, np.int64), sweeps.scan, (mask, growth)
+        if isinstance(state, HybridMapState):
+            detect_in_map_cells(*block, rule, (cap.refill, cap.depth), *state.arrays())
+        else:
+            cells = state.cells
+            _detect(
+                *block,
+                cells.stripe_rows,
+                (cells.groups, cells.first, cells.until, cells.cells, cells.rows),
+                rule,
+                (cap.refill, cap.depth),
+                (
+                    state.level,
+                    state.weight,
+                    state.threshold.view(np.uint64),
+                    state.pair_sums.view(np.uint64),
+                    state.growth.view(np.uint64),
+                ),
+                (
+                    state.ring_sums,
+                    state.ring_rows,
+                    state.ring_pending,
+                    state.ring_cell,
+                    state.cursor,
+                ),
+                (state.budget, state.degraded_sweeps),
+                state.tail,
+            )
         degraded = int(state.degraded_sweeps[0]) > before
-        return Detections(mask, degraded, growth if state.growth.size else None)
+        return Detections(mask, degraded, growth if state.grows else None)
 
-    def thresholds(self, sweeps: Sweeps, state: HybridState) -> NDArray[np.uint8]:
+    def thresholds(self, sweeps: Sweeps, state: HybridState | HybridMapState) -> NDArray[np.uint8]:
         """(n, ranges) the limits that the call would compare the block with."""
         return limits_used(self, sweeps, deepcopy(state))
 
@@ -220,6 +202,7 @@ def _detect(
     tail: Any,
 ) -> None:
     refill, depth = cap
+    grows = rule[5]
     amplitude, rows, tail = borrowed(amplitude), borrowed(rows), borrowed(tail)
     mask, grown = borrowed(masks[0]), borrowed(masks[1])
     threshold, pair_sums, growth = borrowed(memory[2]), borrowed(memory[3]), borrowed(memory[4])
@@ -274,11 +257,12 @@ def _detect(
             else:
                 degraded[0] += 1
                 fit_row(amplitude[i], limits_at, bits, budget, tail)
-                for w in range(grown.shape[1]):
-                    grown[i, w] = bits[w]
+                if grows:
+                    for w in range(bits.size):
+                        grown[i, w] = bits[w]
                 continue
-        if grown.shape[1]:
-            bits_of_row(amplitude[i], growth.ctypes.data, grown[i], tail)
+        if grows:
+            grow_row(amplitude[i], growth.ctypes.data, bits, grown[i], tail)
 
 
 @njit(nogil=True, cache=True)
@@ -286,7 +270,7 @@ def _next_stripe(stripe: int, scan: int, layout: Any, rule: Any, memory: Any, sw
     # One function with plain loops over eight bytes at a time: a call that hands on arrays, or a loop whose length the
     # compiler does not know, costs more here than the work itself.
     groups, first_cell, until, full_cells, full_rows = layout
-    mu, loss, most, learn, grow = rule
+    mu, loss, most, learn, grow, grows = rule
     level, weight, threshold, pair_sums, growth = memory
     sums, rows, pending, current, cursor = swept
     new_scan = scan != cursor[2]
@@ -325,7 +309,7 @@ def _next_stripe(stripe: int, scan: int, layout: Any, rule: Any, memory: Any, sw
         eight = np.uint64(limit) * np.uint64(0x0101010101010101)
         for g in range(groups[k], groups[k + 1]):
             threshold[g] = eight
-        if growth.size:
+        if grows:
             lower = min(np.floor(level[new] + grow + 0.5), limit) if weight[new] >= learn else limit
             eight = np.uint64(lower) * np.uint64(0x0101010101010101)
             for g in range(groups[k], groups[k + 1]):

@@ -69,10 +69,10 @@ class WindowState(ArrayState):
     growth_above: NDArray[np.float64]
     stack: NDArray[np.uint8]
     tail: NDArray[np.uint8]
+    threshold: NDArray[np.uint8]
+    growth: NDArray[np.uint8]
     ring: NDArray[np.uint8] = remembered()
     ring_row: NDArray[np.int64] = remembered()
-    threshold: NDArray[np.uint8] = remembered()
-    growth: NDArray[np.uint8] = remembered()
     budget: NDArray[np.float64] = remembered()
     degraded_sweeps: NDArray[np.int64] = remembered()
 

@@ -49,9 +49,16 @@ def detect_row(
             for w in range(bits.size):
                 grown[w] = bits[w]
         else:
-            bits_of_row(cells, growth.ctypes.data, grown, tail)
-            for w in range(bits.size):
-                grown[w] |= bits[w]
+            grow_row(cells, growth.ctypes.data, bits, grown, tail)
+
+
+@njit(nogil=True, cache=True)
+def grow_row(cells: Any, limits_at: int, bits: Any, grown: Any, tail: Any) -> None:
+    """Fill grown with the cells that exceed the limits at the address, and those of bits; the rest as in
+    `bits_of_row`."""
+    bits_of_row(cells, limits_at, grown, tail)
+    for w in range(bits.size):
+        grown[w] |= bits[w]
 
 
 @njit(nogil=True, cache=True)

@@ -7,15 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.detect.hybrid import Hybrid, HybridState, MacroCells
+from pipeline.detect.hybrid import Hybrid, HybridState
+from pipeline.detect.hybrid_map import HybridMapState
+from pipeline.detect.macro_cells import MacroCells
 from pipeline.tables import Sweeps, VideoFormat
 
 
-def hybrid_masks(
-    part: Hybrid, blocks: Sequence[Sweeps], video: VideoFormat, state: HybridState
-) -> list[NDArray[np.bool_]]:
-    """Detections of whole scans, macro-cell by macro-cell, from the text of the paper (state: only its constants are
-    used)."""
+def square_labels(part: Hybrid, video: VideoFormat) -> NDArray[np.int64]:
+    """(azimuths, ranges) macro-cell of each cell, from the grid."""
     grid = MacroCells.build(video, part.macro_cell_m)
     stripe = np.arange(video.azimuths) // grid.stripe_rows
     label = np.empty((video.azimuths, video.ranges), int)
@@ -23,7 +22,15 @@ def hybrid_masks(
         stop = int(grid.first[k + 1]) if k + 1 < len(grid.first) else len(grid.until)
         cell = first + np.searchsorted(grid.until[first:stop], stripe, side="right")
         label[:, int(grid.groups[k]) * 8 : int(grid.groups[k + 1]) * 8] = cell[:, None]
-    many = len(grid.until)
+    return label
+
+
+def hybrid_masks(
+    part: Hybrid, blocks: Sequence[Sweeps], label: NDArray[np.int64], state: HybridState | HybridMapState
+) -> list[NDArray[np.bool_]]:
+    """Detections of whole scans, macro-cell by macro-cell, from the text of the paper (state: only its constants are
+    used)."""
+    many = label.max() + 1
     assert set(np.unique(label)) == set(range(many))
     full = np.bincount(label.ravel(), minlength=many)
     level, weight = np.zeros(many), np.zeros(many)

@@ -10,17 +10,24 @@ from scipy.stats import binom
 
 from pipeline.detect import Detector
 from pipeline.detect.calibration import false_alarm_probability, threshold_offset_db
-from pipeline.detect.hybrid import Hybrid, MacroCells
+from pipeline.detect.hybrid import Hybrid, HybridState
+from pipeline.detect.macro_cells import FEWEST, MacroCells, MapCells, map_labels
 from pipeline.parts import PartError, build
 from pipeline.tables import VideoFormat
 from tests.frontend.contracts import DetectorContract, busy_video, mask_of
-from tests.frontend.naive import hybrid_masks
+from tests.frontend.naive import hybrid_masks, square_labels
 from tests.frontend.scenes import SMALL, cut, rayleigh, strip
 
 
 class TestHybridKeepsTheContract(DetectorContract):
     def make(self, **setting: Any) -> Detector:
         part: Detector = build("detect", "hybrid", setting)
+        return part
+
+
+class TestHybridOverTheMapKeepsTheContract(DetectorContract):
+    def make(self, **setting: Any) -> Detector:
+        part: Detector = build("detect", "hybrid", {"cells": "map", **setting})
         return part
 
 
@@ -33,8 +40,96 @@ def test_equal_to_the_obvious_twin(azimuths: int, ranges: int, lost: float) -> N
     keep[4] = False
     blocks = [one for one in strip(busy_video(video, 7), video, keep) if len(one)]
     state = part.start(video)
-    for block, wanted in zip(blocks, hybrid_masks(part, blocks, video, state), strict=True):
+    for block, wanted in zip(blocks, hybrid_masks(part, blocks, square_labels(part, video), state), strict=True):
         np.testing.assert_array_equal(part(block, state).cells(ranges), wanted)
+
+
+def ground(video: VideoFormat) -> Any:
+    """A runway and a taxiway across grass, a building, and a few cells of water."""
+    surface = np.zeros((video.azimuths, video.ranges), np.uint8)
+    surface[:, video.ranges // 3 : video.ranges // 3 + 20] = 1
+    surface[video.azimuths // 2 : video.azimuths // 2 + 9] = 2
+    surface[5:30, -30:] = 4
+    surface[40:42, 10:13] = 6
+    return surface
+
+
+@pytest.mark.parametrize(("azimuths", "ranges"), [(96, 150), (400, 256)])
+@pytest.mark.parametrize("lost", [0.0, 0.4])
+def test_map_cells_are_equal_to_the_obvious_twin(azimuths: int, ranges: int, lost: float) -> None:
+    video = VideoFormat(azimuths=azimuths, ranges=ranges, range_step_m=6.0, beamwidth_rad=0.1)
+    part = Hybrid(pfa=1e-3, memory=3, cells="map")
+    keep = np.random.default_rng(2).random((7, azimuths)) >= lost
+    blocks = strip(busy_video(video, 7), video, keep)
+    surface = ground(video)
+    state = part.start(video, surface)
+    label = map_labels(video, surface, part.macro_cell_m)
+    for block, wanted in zip(blocks, hybrid_masks(part, blocks, label, state), strict=True):
+        np.testing.assert_array_equal(part(block, state).cells(ranges), wanted)
+
+
+def test_map_cells_hold_one_kind_of_surface_and_are_not_small() -> None:
+    video = VideoFormat(azimuths=400, ranges=256)
+    surface = ground(video)
+    label = map_labels(video, surface, 100.0)
+    sizes = np.bincount(label.ravel())
+    assert sorted(sizes)[1] >= FEWEST
+    assert sizes[label[40, 10]] == 6  # the water has nothing to be put together with
+    square = MacroCells.build(video, 100.0).labels(video)
+    for number in range(len(sizes)):
+        kinds = np.unique(surface[label == number])
+        assert len(kinds) == 1
+    grass = label[(square == square[200, 250]) & (surface == 0)]
+    assert len(np.unique(grass)) == 1
+    built = MapCells.build(video, surface, 100.0)
+    np.testing.assert_array_equal(built.cells, sizes)
+    drawn = np.full(label.shape, -1)
+    for row in range(400):
+        for start, end, cell in built.runs[built.run_at[row] : built.run_at[row + 1]]:
+            drawn[row, start:end] = cell
+    np.testing.assert_array_equal(drawn, label)
+
+
+def test_without_a_map_the_map_cells_are_the_squares() -> None:
+    square, drawn = Hybrid(pfa=1e-3), Hybrid(pfa=1e-3, cells="map")
+    video = VideoFormat(azimuths=1024, ranges=160, first_range_m=300.0)
+    blocks = strip(busy_video(video, 5), video)
+    assert (MacroCells.build(video, 100.0).cells >= FEWEST).all()
+    a, _ = mask_of(square, blocks, square.start(video))
+    b, _ = mask_of(drawn, blocks, drawn.start(video))
+    np.testing.assert_array_equal(a, b)
+
+
+def test_a_border_of_surfaces_within_a_square_makes_false_alarms_that_the_map_takes_away() -> None:
+    video = VideoFormat(azimuths=256, ranges=256, beamwidth_rad=0.03)
+    surface = np.zeros((256, 256), np.uint8)
+    surface[:, 120:150] = 1
+    rng = np.random.default_rng(7)
+    frames = rayleigh(rng, (6, 256, 256), 35.0)
+    frames[:, surface == 1] = rayleigh(rng, (6, int((surface == 1).sum())), 22.0)
+    alarms = {}
+    for cells in ("square", "map"):
+        part = build("detect", "hybrid", {"cells": cells})
+        state = part.start(video, surface)
+        alarms[cells] = sum(int(np.bitwise_count(part(one, state).mask).sum()) for one in strip(frames, video))
+    assert alarms["square"] > 100
+    assert alarms["map"] <= 5
+
+
+def test_a_saved_state_serves_with_and_without_growth() -> None:
+    """The extractor may be changed in a running chain, and with it whether cells are grown."""
+    for part in (Hybrid(), Hybrid(cells="map")):
+        blocks = strip(busy_video(SMALL, 6), SMALL)
+        plain = part.start(SMALL)
+        for block in blocks[:3]:
+            part(block, plain)
+        growing = part.start(SMALL, growth_db=7.5)
+        growing.restore(plain.save())
+        for block in blocks[3:]:
+            found = part(block, growing)
+            np.testing.assert_array_equal(found.mask, part(block, plain).mask)
+            assert found.growth is not None
+            assert not (found.mask & ~found.growth).any()
 
 
 def test_macro_cells_are_about_a_hundred_metres() -> None:
@@ -61,6 +156,7 @@ def test_calibration_by_the_formula() -> None:
 
 def test_offset_in_use_is_near_the_published_13_83_db() -> None:
     state = Hybrid().start(VideoFormat())
+    assert isinstance(state, HybridState)
     late = state.offset_steps + state.loss_steps / (64 * state.cells.cells)
     early = state.offset_steps + state.loss_steps / state.cells.cells
     assert np.abs(late * 0.3125 - 13.83).max() < 0.1
@@ -85,6 +181,7 @@ def test_false_alarms_are_what_was_asked_at_1e_6_given_the_thresholds() -> None:
     video = VideoFormat(azimuths=1024, ranges=512, beamwidth_rad=0.005)
     part = Hybrid()
     state = part.start(video)
+    assert isinstance(state, HybridState)
     rng = np.random.default_rng(21)
     mean_db = 25.0 + np.linspace(0, 3.125, 512)  # ten steps over the range cells: all fractions of a step
     power = mean_db + 10 * np.log10(rng.exponential(size=(1024, 512)))
@@ -141,7 +238,7 @@ def test_the_first_scan_only_learns() -> None:
 
 
 @pytest.mark.parametrize(
-    "setting", [{"pfa": 0.0}, {"pfa": 1.0}, {"memory": 0}, {"macro_cell_m": -1.0}, {"max_runs": 0}]
+    "setting", [{"pfa": 0.0}, {"pfa": 1.0}, {"memory": 0}, {"macro_cell_m": -1.0}, {"max_runs": 0}, {"cells": "round"}]
 )
 def test_wrong_settings_are_refused(setting: dict[str, Any]) -> None:
     with pytest.raises(PartError):
