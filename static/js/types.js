@@ -78,6 +78,20 @@
  * @property {boolean} simulated
  * @property {string} detail
  * @property {Record<string, number>} counters
+ * @property {Record<string, string>} [parts]  of a radar: the methods that work on its video, by verb
+ */
+
+/**
+ * `GET /api/v1/radars/{id}/parts`: what works on a radar's video, what could, and what it costs.
+ * @typedef {object} RadarParts
+ * @property {string} radar
+ * @property {Record<string, {name: string}>} running  by verb; the settings are beside the name
+ * @property {Record<string, {name: string}>|null} next
+ * @property {number|null} scans_left
+ * @property {number} plots_a_scan
+ * @property {Record<string, number>} ms_a_turn
+ * @property {Record<string, number>} cut
+ * @property {Record<string, {name: string, about: string}[]>} available
  */
 
 /**

@@ -11,6 +11,7 @@ import pytest
 
 from tests.display.conftest import Screen
 from tests.display.serving import Serving
+from tests.service.running import until
 
 pytestmark = pytest.mark.browser
 
@@ -265,3 +266,53 @@ def test_a_layer_that_cannot_be_drawn_says_so_and_the_rest_goes_on(screen: Scree
     screen.until(f"airside.counts().frames > {frames} + 5")
     screen.page.evaluate("() => { CanvasRenderingContext2D.prototype.fillText = window.kept; }")
     screen.until("airside.health() === 'ok'")
+
+
+def test_the_parts_of_a_radar_are_changed_with_the_keyboard_alone(screen: Screen, serving: Serving) -> None:
+    page = screen.page
+
+    def running() -> Any:
+        return serving.service.front_end("smr-1").running["detect"]["name"]
+
+    assert running() == "adaptive"
+    page.locator("#parts-open summary").wait_for()
+    page.locator("#parts-open summary").focus()
+    page.keyboard.press("Enter")
+    first = page.locator('#parts-list [data-key="smr-1"]')
+    first.wait_for()
+    assert "214 plots a turn" in first.inner_text()
+    assert "18 ms" in first.inner_text()
+    assert first.locator(".parts-apply").is_hidden()
+    page.keyboard.press("Tab")
+    page.keyboard.type("hyb")
+    first.locator(".parts-apply").wait_for()
+    assert running() == "adaptive", "nothing is sent before it is applied"
+    for _ in range(8):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.classList.contains('parts-apply')"):
+            break
+    page.keyboard.press("Enter")
+    until(lambda: running() == "hybrid", "the hybrid detector runs")
+    screen.until("document.querySelector('#parts-list .parts-words').textContent === ''")
+    assert first.locator(".parts-orders").is_hidden()
+    assert page.evaluate("document.activeElement.tagName") == "SELECT", "the keyboard is not lost"
+    first.locator("select").first.select_option("adaptive")
+    first.locator(".parts-orders .plain").click()
+    assert first.locator("select").first.input_value() == "hybrid"
+    serving.service.choose_parts("smr-1", {"detect": {"name": "adaptive"}})
+    screen.until("document.querySelector('#parts-list select').value === 'adaptive'")
+    assert screen.errors == []
+
+
+def test_a_radar_that_leaves_something_out_is_told_in_words_until_it_is_over(screen: Screen, serving: Serving) -> None:
+    words = "detections cut, 312 sweeps in the last 10 s"
+    assert "smr-1" not in text(screen, "#degraded")
+    serving.service.cut["smr-1"] = words
+    try:
+        screen.until("document.querySelector('#degraded').innerText.includes('◐ smr-1 degraded')")
+        assert f"radar smr-1: {words}" in str(screen.page.locator("#degraded").get_attribute("title"))
+        assert words in text(screen, '#sensor-list [data-key="smr-1"]')
+    finally:
+        serving.service.cut.clear()
+    screen.until("!document.querySelector('#degraded').innerText.includes('smr-1')")
+    assert screen.errors == []

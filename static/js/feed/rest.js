@@ -42,6 +42,20 @@ export async function setRunway(id, change) {
   return response.json().catch(() => null);
 }
 
+/** @param {string} radar @returns {Promise<import('../types.js').RadarParts>} */
+export const fetchParts = async (radar) => (await call(`/api/v1/radars/${encodeURIComponent(radar)}/parts`)).json();
+
+/**
+ * Have other parts work on a radar's video; they may have to be compiled first.
+ * @param {string} radar @param {Record<string, {name: string}>} order @returns {Promise<import('../types.js').RadarParts>}
+ */
+export async function chooseParts(radar, order) {
+  const response = await call(`/api/v1/radars/${encodeURIComponent(radar)}/parts`, {
+    method: 'PUT', headers: { 'content-type': 'application/json' }, body: JSON.stringify(order),
+  }, 120000);
+  return response.json();
+}
+
 /**
  * @typedef {object} VideoPicture
  * @property {ImageBitmap} image

@@ -6,7 +6,7 @@ import { byId, el } from './dom.js';
 /** @type {[string, string][]} */
 const SIGNS = [
   ['✈', 'aircraft; true size when zoomed in'], ['■', 'vehicle'], ['◇', 'not identified'], ['○', 'aircraft, heading unknown'],
-  ['┄ hollow', 'coasting: not seen, age in the label; or tentative, with ?'], ['SIM', 'simulated target'],
+  ['┄ hollow', 'coasting: not seen, age in the label; or tentative, with ?'], ['SIM', 'simulated target'], ['◐', 'degraded: something is left out; the sensor list says what'],
   ['◆ dashed ring', 'information alert'], ['▲ double ring', 'alarm; flashes until acknowledged'],
 ];
 

@@ -26,6 +26,7 @@ export class SensorPanel {
 
   update() {
     const sensors = [...this.picture.sensors.values()];
+    this.warn(sensors);
     byId('sensor-none').hidden = sensors.length > 0;
     const poor = sensors.filter((one) => one.status !== 'ok').length;
     setText(byId('sensor-count'), poor ? `${poor} of ${sensors.length} not ok` : sensors.length ? `${sensors.length} ok` : '');
@@ -33,6 +34,15 @@ export class SensorPanel {
       el('span', { class: 'sensor-mark', 'aria-hidden': 'true' }), this.nameButton(one.id), el('span', { class: 'sensor-state' }),
       el('span', { class: 'sensor-age' }), el('span', { class: 'sensor-drops' }), el('dl', { class: 'sensor-all', hidden: true })),
     (element, one) => this.fill(element, one));
+  }
+
+  /** Say in the top bar which radars do not tell all. @param {SensorState[]} sensors */
+  warn(sensors) {
+    const poor = sensors.filter((one) => one.kind === 'radar' && (one.status === 'degraded' || one.status === 'silent'));
+    const chip = byId('degraded');
+    chip.hidden = poor.length === 0;
+    setText(chip, poor.map((one) => `${MARKS[/** @type {keyof typeof MARKS} */ (one.status)]} ${one.id} ${one.status}`).join('  '));
+    chip.title = poor.map((one) => `radar ${one.id}: ${one.detail || one.status}`).join('\n');
   }
 
   /** @param {HTMLElement} element @param {SensorState} sensor */
