@@ -9,24 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.kernels.components import ComponentState, extract_block, flush_components
-from pipeline.kernels.plot_shape import Geometry, plots_from
+from pipeline.kernels.components import ComponentState, flush, take_block
+from pipeline.kernels.links import LinkRule
 from pipeline.sites import RadarSite
 from pipeline.tables import Detections, Plots, Sweeps
-
-NO_PLOTS = Plots.empty()
-
-
-@dataclass(eq=False, kw_only=True)
-class ManhattanState(ComponentState):
-    """The open components, and what follows from site and settings."""
-
-    azimuths: int
-    reach_of_cell: NDArray[np.int64]
-    most_rows: int
-    geometry: Geometry
 
 
 @dataclass(frozen=True)
@@ -64,41 +51,29 @@ class Manhattan:
         if not 0 < self.max_extent_turn <= 0.5:
             raise ValueError("max_extent_turn must lie above 0 and not above 0.5")
 
-    def start(self, site: RadarSite) -> ManhattanState:
+    def start(self, site: RadarSite) -> ComponentState:
         """The state of one radar before its first sweep. On a very coarse grid M is kept below a third of a turn."""
         video = site.video
         slant = video.first_range_m + video.range_step_m * np.arange(video.ranges)
         ring = np.searchsorted(np.array(self.ring_m), slant, side="right") - 1
         reach = np.array(self.reach, np.int64)[np.maximum(ring, 0)]
         reach = np.minimum(reach, max(1, (video.azimuths - 2) // 3))
-        deepest = int(reach.max())
-        most_rows = max(deepest + 1, int(video.azimuths * self.max_extent_turn))
-        return ManhattanState(
-            azimuths=video.azimuths,
-            reach_of_cell=np.append(reach, 0),
-            most_rows=most_rows,
-            geometry=Geometry.of(site),
-            **ComponentState.empty_arrays(video.azimuths, video.ranges, deepest, len(self.reach), self.max_open_runs),
+        rule = LinkRule.of(np.maximum(reach[:, None] - np.arange(reach.max() + 1), -1))
+        return ComponentState.of(
+            site,
+            rule,
+            min_cells=self.min_cells,
+            max_extent_turn=self.max_extent_turn,
+            max_open_runs=self.max_open_runs,
         )
 
-    def __call__(self, sweeps: Sweeps, detections: Detections, state: ManhattanState) -> Plots:
+    def __call__(self, sweeps: Sweeps, detections: Detections, state: ComponentState) -> Plots:
         """The plots that this block completed."""
-        rows = extract_block(
-            sweeps,
-            detections,
-            state,
-            sweeps.scan * state.azimuths,
-            state.reach_of_cell,
-            (self.min_cells, state.most_rows),
-            state.geometry,
-        )
-        state.radar[0] = sweeps.radar
-        return plots_from(sweeps.radar, rows) if len(rows) else NO_PLOTS
+        return take_block(sweeps, detections, state)
 
-    def flush(self, state: ManhattanState) -> Plots:
+    def flush(self, state: ComponentState) -> Plots:
         """The plots that were still open."""
-        rows = flush_components(state, (self.min_cells, state.most_rows), state.geometry)
-        return plots_from(int(state.radar[0]), rows)
+        return flush(state)
 
 
 PART = Manhattan

@@ -1,8 +1,12 @@
 """Connected components over an endless strip of sweeps: runs come in row by row, components go out when nothing can
 join.
 
-The window holds the runs of the newest `reach + 1` rows; a component is complete when its last row leaves the window.
-All rows are absolute (scan * azimuths + row), so north is a row like any other.
+All rows are absolute (scan * azimuths + row), so north is a row like any other. The newest `rule.rows` rows are the
+window that a new run may link to; a component is complete when its last row leaves it.
+
+An extractor gives a `LinkRule` and, with every block, detections: `ComponentState.of` makes the state, `take_block`
+and `flush` give plots. With a `GrowthWindow` (see `pipeline.kernels.growth`) plots are made of the cells of
+`Detections.growth` near detected ones, and what holds no detected cell is left out and counted.
 """
 
 from __future__ import annotations
@@ -14,74 +18,95 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipeline.kernels.bits import borrowed, trailing_zeros
-from pipeline.kernels.plot_shape import COLUMNS, Geometry, measure_plot
-from pipeline.kernels.runs import (
-    END,
-    FIELDS,
-    FIRST,
-    FREE,
-    GRID,
-    LAST,
-    NEXT,
-    PARENT,
-    PEAK,
-    REACH,
-    ROW,
-    START,
-    SUM,
-    TAIL,
-    find,
-    unite,
+from pipeline.kernels.bits import borrowed
+from pipeline.kernels.links import LinkRule
+from pipeline.kernels.plot_shape import (
+    AZIMUTH,
+    BEARING_CELLS,
+    COSINE,
+    GIVEN,
+    SCAN,
+    SINE,
+    TIME,
+    TURN_FIELDS,
+    Geometry,
+    PlotColumns,
+    measure_plot,
+    measure_run,
 )
+from pipeline.kernels.runs import FREE, RUN, any_bit, find, find_runs, unite
+from pipeline.sites import RadarSite
 from pipeline.state import ArrayState, read_only, remembered
-from pipeline.tables import Detections, Sweeps
+from pipeline.tables import Detections, Plots, Sweeps
 
-NEWEST, OLDEST, UNUSED, DROPPED, CUT, SMALL, CELLS = range(7)
-"""Places in `ComponentState.numbers`: newest row, oldest row with runs in the window, free runs in the pool, and
-counts."""
+NEWEST, LATEST, RETIRED, HEAD, TAIL, DROPPED, CUT, SMALL, SEEDLESS, CELLS, TAKEN, NUMBERS = range(12)
+"""Places in `ComponentState.numbers`: newest row, newest row with runs, row up to which all are retired, first free
+place and oldest open run of the pool, and counts; TAKEN: steps of the present block that are done."""
 
-NEVER = np.iinfo(np.int64).max
+MOVE = 512
+"""Delivered runs at the beginning of the pool that are worth moving the others down for."""
 
 
 @dataclass(eq=False, kw_only=True)
 class ComponentState(ArrayState):
-    """The open components. closed_row: see `pipeline.extract`."""
+    """The open components. closed_row: see `pipeline.extract`.
 
-    out: NDArray[np.float64]
+    limits: fewest cells of a plot, most rows of a plot, most runs in the rows of open plots.
+    """
+
+    azimuths: int
+    rule: LinkRule
+    geometry: Geometry
+    limits: tuple[int, int, int]
+    room: NDArray[np.int64]
     radar: NDArray[np.int64] = remembered()
-    runs: NDArray[np.int64] = remembered()
-    unused: NDArray[np.int64] = remembered()
+    runs: NDArray[Any] = remembered()
     window: NDArray[np.int64] = remembered()
-    window_rows: NDArray[np.int64] = remembered()
+    window_bits: NDArray[np.uint64] = remembered()
     numbers: NDArray[np.int64] = remembered()
     turn: NDArray[np.float64] = remembered()
-    azimuth: NDArray[np.float64] = remembered()
 
     @classmethod
-    def empty_arrays(
-        cls, azimuths: int, ranges: int, reach: int, rings: int, open_runs: int
-    ) -> dict[str, NDArray[Any]]:
-        """The arrays of a state in which nothing is open: keyword arguments for a subclass."""
-        a_row = (ranges + 1) // 2 + rings
-        runs = np.zeros((open_runs, FIELDS), np.int64)
-        runs[:, PARENT] = FREE
-        return {
-            "out": np.zeros((min((reach + 1) * a_row, open_runs) + 256, COLUMNS)),
-            "radar": np.zeros(1, np.int64),
-            "runs": runs,
-            "unused": np.arange(open_runs - 1, -1, -1, dtype=np.int64),
-            "window": np.zeros((reach + 1, a_row), np.int64),
-            "window_rows": np.tile(np.array([-1, 0], np.int64), (reach + 1, 1)),
-            "numbers": np.array([-1, NEVER, open_runs, 0, 0, 0, 0], np.int64),
-            "turn": np.zeros((3, azimuths)),
-            "azimuth": np.full(azimuths, np.nan),
-        }
+    def of(
+        cls, site: RadarSite, rule: LinkRule, *, min_cells: int, max_extent_turn: float, max_open_runs: int, **more: Any
+    ) -> ComponentState:
+        """A state in which nothing is open.
+
+        max_extent_turn: part of a turn that a plot may cover. more: fields of a subclass. Raises ValueError when the
+        rule reaches over a third of a turn.
+        """
+        video = site.video
+        if rule.rows > max(1, (video.azimuths - 2) // 3):
+            raise ValueError(f"a link over {rule.rows} rows is too far for a turn of {video.azimuths}")
+        slots = 1 << rule.rows.bit_length()
+        window = np.zeros((slots, 3), np.int64)
+        window[:, 0] = -1
+        turn = np.zeros((video.azimuths, TURN_FIELDS))
+        turn[:, GIVEN] = np.nan
+        numbers = np.zeros(NUMBERS, np.int64)
+        numbers[NEWEST] = numbers[LATEST] = numbers[RETIRED] = -1
+        return cls(
+            azimuths=video.azimuths,
+            rule=rule,
+            geometry=Geometry.of(site),
+            limits=(min_cells, max(rule.rows + 1, int(video.azimuths * max_extent_turn)), max_open_runs),
+            room=np.zeros(1, np.int64),
+            radar=np.zeros(1, np.int64),
+            runs=np.zeros(2 * max_open_runs + MOVE, RUN),
+            window=window,
+            window_bits=np.zeros((slots, video.words), np.uint64),
+            numbers=numbers,
+            turn=turn,
+            **more,
+        )
 
     @property
     def closed_row(self) -> int:
         """First absolute row that an open plot, or one still to come, may have."""
-        return int(_closed_row(self.runs, self.window, self.window_rows, self.numbers))
+        newest, head, tail = (int(self.numbers[at]) for at in (NEWEST, HEAD, TAIL))
+        if head == tail:
+            return newest + 1
+        return newest - (newest - int(self.runs[tail]["row"])) % self.azimuths
 
     @property
     def counters(self) -> dict[str, int]:
@@ -90,241 +115,265 @@ class ComponentState(ArrayState):
         return {
             "cells_detected": int(n[CELLS]),
             "plots_below_min_cells": int(n[SMALL]),
+            "plots_without_seed": int(n[SEEDLESS]),
             "plots_cut_at_max_extent": int(n[CUT]),
             "runs_dropped": int(n[DROPPED]),
         }
 
+    @property
+    def pool(self) -> tuple[NDArray[Any], ...]:
+        """What the kernels change."""
+        return self.runs, self.window, self.window_bits, self.numbers, self.turn
 
-def extract_block(
-    sweeps: Sweeps,
-    detections: Detections,
-    state: ComponentState,
-    first_row: int,
-    reach_of_cell: NDArray[np.int64],
-    limits: tuple[int, int],
-    geometry: Geometry,
-) -> NDArray[np.float64]:
-    """Take in a block and give the output rows (n, COLUMNS) of the plots that it completed.
+    @property
+    def scale(self) -> tuple[Any, ...]:
+        """What the kernels read of the geometry."""
+        one = self.geometry
+        return one.constants, one.ground, one.sums, one.loudness
 
-    first_row: scan * azimuths. reach_of_cell: (ranges + 1) link distance of each range cell, falling; 0 past the last.
-    limits: (fewest cells of a plot, most rows of a plot).
-    """
-    arguments = (
+    def columns(self) -> PlotColumns:
+        """Room for the plots of a block like the last one, and for all that is open."""
+        still_open = int(self.numbers[HEAD] - self.numbers[TAIL])
+        return PlotColumns.room_for(max(256, still_open + 64, int(self.room[0]) * 5 // 4))
+
+
+def take_block(sweeps: Sweeps, detections: Detections, state: ComponentState) -> Plots:
+    """Take in a block and give the plots that it completed; they are made of the detected cells."""
+    block = (
+        read_only(detections.mask),
         read_only(sweeps.amplitude),
         read_only(sweeps.row, np.int64),
         read_only(sweeps.azimuth),
         read_only(sweeps.time),
-        read_only(detections.mask),
     )
-    done, made, out = 0, [], state.out
-    while done < len(sweeps):
-        done, count = _take_rows(
-            done,
-            arguments,
-            first_row,
-            reach_of_cell,
-            limits,
-            (state.runs, state.unused, state.window, state.window_rows, state.numbers),
-            (state.turn, state.azimuth),
-            (geometry.constants, geometry.sums),
-            out,
+    state.radar[0] = sweeps.radar
+    state.numbers[TAKEN] = 0
+    first_row = sweeps.scan * state.azimuths
+    made = []
+    while state.numbers[TAKEN] <= len(sweeps):
+        columns = state.columns()
+        count = _take_rows(
+            block, first_row, state.azimuths, state.rule.arrays, state.limits, state.pool, state.scale, columns.arrays
         )
-        if count:
-            made.append(out[:count].copy())
-    return made[0] if len(made) == 1 else np.concatenate(made) if made else out[:0]
+        made.append(columns.table(sweeps.radar, count))
+    state.room[0] = sum(len(one) for one in made)
+    return Plots.concatenate(made)
 
 
-def flush_components(state: ComponentState, limits: tuple[int, int], geometry: Geometry) -> NDArray[np.float64]:
-    """Complete all open components; the output rows as in extract_block."""
-    pool = (state.runs, state.unused, state.window, state.window_rows, state.numbers)
-    after = int(state.numbers[NEWEST]) + state.window.shape[0]
-    count = _retire(after, pool, limits, state.turn, (geometry.constants, geometry.sums), state.out, 0)
-    return state.out[:count].copy()
+def flush(state: ComponentState) -> Plots:
+    """Complete all open components."""
+    columns = state.columns()
+    after = int(state.numbers[NEWEST]) + len(state.window) + 1
+    geometry = state.scale[:3]
+    count = retire(after, state.azimuths, state.rule.rows, state.limits, state.pool, geometry, columns.arrays, 0)
+    return columns.table(int(state.radar[0]), int(count))
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _take_rows(
-    done: int,
-    block: Any,
-    first_row: int,
-    reach_of_cell: Any,
-    limits: Any,
-    pool: Any,
-    sweep: Any,
-    geometry: Any,
-    out: Any,
-) -> tuple[int, int]:
-    amplitude, mask = borrowed(block[0]), borrowed(block[4])
-    rows, azimuths, times = borrowed(block[1]), borrowed(block[2]), borrowed(block[3])
-    runs, unused = borrowed(pool[0]), borrowed(pool[1])
-    window, window_rows, numbers = borrowed(pool[2]), borrowed(pool[3]), borrowed(pool[4])
-    reach_of_cell, out = borrowed(reach_of_cell), borrowed(out)
-    turn, azimuth = borrowed(sweep[0]), borrowed(sweep[1])
-    pool = (runs, unused, window, window_rows, numbers)
-    geometry = (geometry[0], borrowed(geometry[1]))
+    block: Any, first_row: int, azimuths: int, rule: Any, limits: Any, pool: Any, scale: Any, out: Any
+) -> Any:
+    mask, amplitude = borrowed(block[0]), borrowed(block[1])
+    rows, azimuth, times = borrowed(block[2]), borrowed(block[3]), borrowed(block[4])
+    rule = (borrowed(rule[0]), borrowed(rule[1]), borrowed(rule[2]))
+    pool = (borrowed(pool[0]), borrowed(pool[1]), borrowed(pool[2]), borrowed(pool[3]), borrowed(pool[4]))
+    scale = (scale[0], borrowed(scale[1]), borrowed(scale[2]), borrowed(scale[3]))
+    out = (borrowed(out[0]), borrowed(out[1]), borrowed(out[2]), borrowed(out[3]), borrowed(out[4]), borrowed(out[5]))
+    numbers = pool[3]
+    reach_rows = rule[2].shape[1] - 1
+    geometry = (scale[0], scale[1], scale[2])
+    room = out[0].shape[1]
     count = 0
-    words = mask.shape[1]
-    cells = amplitude.shape[1]
-    depth = window.shape[0]
+    done = numbers[TAKEN]
     while done < rows.size:
         bits = mask[done]
-        row = first_row + rows[done]
-        if numbers[UNUSED] < runs.shape[0] and numbers[OLDEST] <= row - depth:
-            if count + min(runs.shape[0] - numbers[UNUSED], window.size) > out.shape[0]:
-                return done, count
-            count = _retire(row, pool, limits, turn, geometry, out, count)
-        numbers[NEWEST] = row
         anything = np.uint64(0)
-        for w in range(words):
+        for w in range(bits.size):
             anything |= bits[w]
         if anything:
-            i = rows[done]
-            if azimuth[i] != azimuths[done]:
-                azimuth[i] = azimuths[done]
-                turn[0, i], turn[1, i] = np.sin(azimuths[done]), np.cos(azimuths[done])
-            turn[2, i] = times[done]
-            slot = row % depth
-            n = _find_runs(bits, amplitude[done], row, i, reach_of_cell, cells, pool, window[slot])
-            if n:
-                if numbers[UNUSED] + n == runs.shape[0]:
-                    numbers[OLDEST] = row
-                window_rows[slot, 0] = row
-                window_rows[slot, 1] = n
-                _link_rows(row, slot, n, limits[1], pool)
-        done += 1
-    return done, count
-
-
-@njit(nogil=True, cache=True)
-def _find_runs(
-    bits: Any, cells: Any, row: int, grid_row: int, reach_of_cell: Any, ranges: int, pool: Any, slot: Any
-) -> int:
-    runs, unused, numbers = pool[0], pool[1], pool[4]
-    one, top = np.uint64(1), np.uint64(63)
-    n = 0
-    start: Any = -1
-    carry = np.uint64(0)
-    for w in range(bits.size + 1):
-        word = bits[w] if w < bits.size else np.uint64(0)
-        turns = word ^ ((word << one) | carry)
-        carry = word >> top
-        while turns:
-            at = min(64 * w + np.int64(trailing_zeros(turns)), ranges)
-            turns &= turns - one
-            if start < 0:
-                start = at
-                continue
-            while start < at:
-                reach = reach_of_cell[start]
-                end = start + 1
-                total, peak = np.int64(cells[start]), np.int64(cells[start])
-                while end < at and reach_of_cell[end] == reach:
-                    value = np.int64(cells[end])
-                    total += value
-                    peak = max(peak, value)
-                    end += 1
-                if numbers[UNUSED] == 0:
-                    numbers[DROPPED] += 1
-                else:
-                    numbers[UNUSED] -= 1
-                    run = unused[numbers[UNUSED]]
-                    runs[run, ROW], runs[run, START], runs[run, END] = row, start, end
-                    runs[run, SUM], runs[run, PEAK], runs[run, REACH] = total, peak, reach
-                    runs[run, PARENT], runs[run, NEXT], runs[run, TAIL] = run, -1, run
-                    runs[run, FIRST], runs[run, LAST], runs[run, GRID] = row, row, grid_row
-                    slot[n] = run
-                    n += 1
-                start = end
-            start = -1
-    return n
-
-
-@njit(nogil=True, cache=True)
-def _link_rows(row: int, slot_of_row: int, n: int, most_rows: int, pool: Any) -> None:
-    runs, window, window_rows = pool[0], pool[2], pool[3]
-    depth = window.shape[0]
-    slot = window[slot_of_row]
-    # a run's two neighbours in its own row are enough: the reach falls with range, so what links over a run links to it
-    for k in range(1, n):
-        if runs[slot[k], START] - runs[slot[k - 1], END] < runs[slot[k], REACH]:
-            unite(runs, slot[k - 1], slot[k])
-    other = slot_of_row
-    for back in range(1, runs[slot[0], REACH] + 1):
-        other = other - 1 if other else depth - 1
-        if window_rows[other, 0] != row - back:
-            continue
-        before, m = window[other], window_rows[other, 1]
-        p = 0
-        for k in range(n):
-            run = slot[k]
-            reach = runs[run, REACH] - back
-            if reach < 0:
+            if count + open_runs(numbers) > room:
                 break
-            start, end = runs[run, START], runs[run, END]
-            while p < m and start - runs[before[p], END] >= reach:
-                p += 1
-            q = p
-            while q < m:
-                old = before[q]
-                gap = runs[old, START] - end + 1
-                if gap > 0 and gap > runs[old, REACH] - back:
-                    break
-                if row - runs[find(runs, old), FIRST] < most_rows:
-                    unite(runs, old, run)
-                q += 1
-
-
-@njit(nogil=True, cache=True)
-def _retire(row: int, pool: Any, limits: Any, turn: Any, geometry: Any, out: Any, count: int) -> Any:
-    """Complete the components whose last row can no longer be reached from `row`."""
-    runs, unused, window, window_rows, numbers = pool
-    fewest, most_rows = limits
-    constants, sums = geometry
-    depth = window.shape[0]
-    while numbers[OLDEST] <= row - depth:
-        old = numbers[OLDEST]
-        slot = old % depth
-        for k in range(window_rows[slot, 1]):
-            run = window[slot, k]
-            if runs[run, PARENT] == FREE:
-                continue
-            root = find(runs, run)
-            if runs[root, LAST] != old:
-                continue
-            total = 0
-            one = root
-            while one >= 0:
-                total += runs[one, END] - runs[one, START]
-                one = runs[one, NEXT]
-            numbers[CELLS] += total
-            numbers[CUT] += runs[root, LAST] - runs[root, FIRST] + 1 >= most_rows
-            if total >= fewest:
-                measure_plot(root, runs, turn, constants, sums, out[count])
-                count += 1
-            else:
-                numbers[SMALL] += 1
-            one = root
-            while one >= 0:
-                runs[one, PARENT] = FREE
-                unused[numbers[UNUSED]] = one
-                numbers[UNUSED] += 1
-                one = runs[one, NEXT]
-        window_rows[slot, 0] = -1
-        numbers[OLDEST] = NEVER
-        for other in range(depth):
-            if window_rows[other, 0] >= 0:
-                numbers[OLDEST] = min(numbers[OLDEST], window_rows[other, 0])
+            row, grid_row = first_row + rows[done], rows[done]
+            count = retire(row, azimuths, reach_rows, limits, pool, geometry, out, count)
+            note_row(row, grid_row, azimuth[done], times[done], scale[0], pool[4])
+            take_row(row, grid_row, azimuths, bits, bits, False, amplitude[done], rule, limits, pool, scale)
+        done += 1
+    if done == rows.size and count + open_runs(numbers) <= room:
+        row = first_row + rows[done - 1]
+        count = retire(row, azimuths, reach_rows, limits, pool, geometry, out, count)
+        numbers[NEWEST] = row
+        done += 1
+    numbers[TAKEN] = done
     return count
 
 
-@njit(nogil=True, cache=True)
-def _closed_row(runs: Any, window: Any, window_rows: Any, numbers: Any) -> Any:
-    closed = numbers[NEWEST] + 1
-    if numbers[UNUSED] == runs.shape[0]:
-        return closed
-    for slot in range(window.shape[0]):
-        if window_rows[slot, 0] < 0:
+@njit(nogil=True, cache=True, _nrt=False, forceinline=True)
+def open_runs(numbers: Any) -> Any:
+    """Runs in the rows of open plots: no more plots than these can become complete before the next row is taken."""
+    return numbers[HEAD] - numbers[TAIL]
+
+
+@njit(nogil=True, cache=True, _nrt=False)
+def note_row(row: int, grid_row: int, azimuth: float, time: float, constants: Any, turn: Any) -> None:
+    """Remember when and where a row with runs was swept."""
+    here = turn[grid_row]
+    if here[GIVEN] != azimuth:
+        here[GIVEN] = azimuth
+        here[SINE], here[COSINE] = np.sin(azimuth), np.cos(azimuth)
+        here[AZIMUTH] = azimuth % (2 * np.pi)
+    here[TIME] = time
+    here[SCAN] = np.rint((row + 0.5 - here[AZIMUTH] / constants[4]) / constants[6])
+
+
+@njit(nogil=True, cache=True, _nrt=False)
+def take_row(
+    row: int,
+    grid_row: int,
+    azimuths: int,
+    bits: Any,
+    seeds: Any,
+    grown: bool,
+    cells: Any,
+    rule: Any,
+    limits: Any,
+    pool: Any,
+    scale: Any,
+) -> None:
+    """Add the runs of a row to the pool and link them to those of the rows before; retire() comes first."""
+    runs, window, window_bits, numbers, _ = pool
+    if numbers[TAIL] >= MOVE and 2 * numbers[TAIL] >= numbers[HEAD]:
+        _move_down(runs, window, numbers)
+    first = numbers[HEAD]
+    room = limits[2] - (first - numbers[TAIL])
+    head, dropped = find_runs(bits, seeds, grown, cells, grid_row, rule, (scale[3], scale[1]), runs, first, room)
+    numbers[DROPPED] += dropped
+    if head == first:
+        return
+    numbers[HEAD] = head
+    numbers[LATEST] = row
+    slot = row & (window.shape[0] - 1)
+    window[slot, 0], window[slot, 1], window[slot, 2] = row, first, head
+    kept = window_bits[slot]
+    for w in range(kept.size):
+        kept[w] = bits[w]
+    _link_rows(row, grid_row, azimuths, first, head, limits[1], rule[2], pool)
+
+
+@njit(nogil=True, cache=True, _nrt=False)
+def _link_rows(
+    row: int, grid_row: int, azimuths: int, first: int, head: int, most_rows: int, reach: Any, pool: Any
+) -> None:
+    runs, window, window_bits, _, _ = pool
+    last_bit = 64 * window_bits.shape[1] - 1
+    for back in range(1, reach.shape[1]):
+        if reach[runs[first].ring, back] < 0:
+            break
+        slot = (row - back) & (window.shape[0] - 1)
+        if window[slot, 0] != row - back:
             continue
-        for k in range(window_rows[slot, 1]):
-            closed = min(closed, runs[find(runs, window[slot, k]), FIRST])
-    return closed
+        before = window_bits[slot]
+        p, stop = window[slot, 1], window[slot, 2]
+        for run in range(first, head):
+            away = reach[runs[run].ring, back]
+            if away < 0:
+                break
+            low, high = np.int64(runs[run].start) - away, np.int64(runs[run].end) - 1
+            if not any_bit(before, max(low, 0), min(high + away, last_bit)):
+                continue
+            while p < stop and runs[p].end <= low:
+                p += 1
+            mine = find(runs, np.int64(run))
+            for q in range(p, stop):
+                gap = np.int64(runs[q].start) - high
+                if gap > 0 and gap > reach[runs[q].ring, back]:
+                    break
+                other = find(runs, np.int64(q))
+                if other != mine and (grid_row - np.int64(runs[other].row)) % azimuths < most_rows:
+                    mine = unite(runs, mine, other, grid_row)
+
+
+@njit(nogil=True, cache=True, _nrt=False)
+def _move_down(runs: Any, window: Any, numbers: Any) -> None:
+    by, head = numbers[TAIL], numbers[HEAD]
+    for k in range(by, head):
+        runs[k - by] = runs[k]
+        if runs[k].parent != FREE:
+            runs[k - by].parent = runs[k].parent - by
+            runs[k - by].next = runs[k].next - by
+    for slot in range(window.shape[0]):
+        window[slot, 1] -= by
+        window[slot, 2] -= by
+    numbers[TAIL] = 0
+    numbers[HEAD] = head - by
+
+
+@njit(nogil=True, cache=True, _nrt=False)
+def retire(
+    row: int, azimuths: int, reach_rows: int, limits: Any, pool: Any, geometry: Any, out: Any, count: int
+) -> Any:
+    """Complete the components whose last row can no longer be reached from `row`: those that have cells enough, a
+    detected one among them, are written from output row `count` on. Gives the new count."""
+    runs, window, _, numbers, turn = pool
+    constants, ground, sums = geometry[0], geometry[1], geometry[2]
+    axis_cells = np.int64(np.ceil(BEARING_CELLS * constants[5] / constants[4]))
+    until = row - reach_rows - 1
+    if numbers[HEAD] == numbers[TAIL]:
+        numbers[HEAD] = numbers[TAIL] = 0
+        numbers[RETIRED] = until
+        return count
+    for old in range(numbers[RETIRED] + 1, min(until, numbers[LATEST]) + 1):
+        slot = old & (window.shape[0] - 1)
+        if window[slot, 0] != old:
+            continue
+        window[slot, 0] = -1
+        for run in range(window[slot, 1], window[slot, 2]):
+            one = runs[run]
+            if one.parent == FREE:
+                continue
+            root = find(runs, np.int64(run))
+            if runs[root].last != one.row:
+                continue
+            total, seeds = np.int64(one.end) - np.int64(one.start), np.int64(one.seeds)
+            if one.next != run:
+                total, seeds = _sizes(root, runs)
+            numbers[CELLS] += total
+            if total < limits[0] or seeds == 0:
+                numbers[SMALL if seeds else SEEDLESS] += 1
+                _free(root, runs)
+                continue
+            if one.next == run and total < axis_cells:
+                measure_run(one, turn, (constants, ground, sums), out, count)
+                one.parent = FREE
+            else:
+                rows = (np.int64(one.row) - np.int64(runs[root].row)) % azimuths + 1
+                numbers[CUT] += rows >= limits[1]
+                measure_plot(root, old, runs, turn, (constants, ground, sums), out, count)
+            count += 1
+    numbers[RETIRED] = until
+    tail = numbers[TAIL]
+    while tail < numbers[HEAD] and runs[tail].parent == FREE:
+        tail += 1
+    numbers[TAIL] = tail
+    return count
+
+
+@njit(nogil=True, cache=True, _nrt=False, forceinline=True)
+def _sizes(root: int, runs: Any) -> tuple[int, int]:
+    total = seeds = np.int64(0)
+    run = np.int64(root)
+    while True:
+        total += np.int64(runs[run].end) - np.int64(runs[run].start)
+        seeds += np.int64(runs[run].seeds)
+        run = np.int64(runs[run].next)
+        if run == root:
+            return total, seeds
+
+
+@njit(nogil=True, cache=True, _nrt=False)
+def _free(root: int, runs: Any) -> None:
+    run = np.int64(root)
+    while True:
+        runs[run].parent = FREE
+        run = np.int64(runs[run].next)
+        if run == root:
+            return

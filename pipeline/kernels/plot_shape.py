@@ -9,12 +9,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipeline.kernels.runs import END, FIRST, GRID, LAST, NEXT, PEAK, ROW, START, SUM
+from pipeline.kernels.runs import FREE
 from pipeline.sites import RadarSite
 from pipeline.tables import Plots
-
-COLUMNS = 22
-"""Width of a plot's row in the output of the kernels; `plots_from` names the columns."""
 
 SCATTERERS = 16.0
 """The cells of one target fluctuate together with its few strong scatterers: no more parts than these are
@@ -32,13 +29,28 @@ BEARING_LIMIT = 0.35
 BEARING_CELLS = 8.0
 """Independent cells below which there is no axis."""
 
+SINE, COSINE, TIME, AZIMUTH, SCAN, GIVEN, TURN_FIELDS = 0, 1, 2, 3, 4, 5, 8
+"""What is known of a row of the grid that had runs: of its azimuth (0 .. 2 pi), s, rad, turn it belongs to, and the
+azimuth as it was given."""
+
+WIDE = ("time", "east", "north", "range", "azimuth", "weighted_east", "weighted_north", "scan")
+NARROW = (
+    "range_extent", "azimuth_extent", "length", "width", "mean_amplitude", "peak_amplitude", "bearing", "bearing_sd",
+    "cells",
+)  # fmt: skip
+"""Columns of 8 and of 4 octets, in the order of their rows in PlotColumns; the last of each are integers."""
+
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """What turns cells into metres. sums: (2, ranges + 1) of ground range and its square over the cells before each."""
+    """What turns cells into metres. ground: (ranges) ground range of each cell. sums: (2, ranges + 1) of ground range
+    and its square over the cells before each. loudness: (256) linear amplitude of each log amplitude.
+    """
 
     constants: tuple[float, float, float, float, float, float, float]
+    ground: NDArray[np.float64]
     sums: NDArray[np.float64]
+    loudness: NDArray[np.float64]
 
     @classmethod
     def of(cls, site: RadarSite) -> Geometry:
@@ -58,137 +70,251 @@ class Geometry:
             float(max(video.beamwidth_rad, video.azimuth_step_rad)),
             float(video.azimuths),
         )
-        return cls(constants, sums)
+        return cls(constants, ground, sums, 10.0 ** (np.arange(256) * video.db_per_step / 20))
 
 
-def plots_from(radar: int, rows: NDArray[np.float64]) -> Plots:
-    """The table made of the kernel's output rows."""
-    return Plots.build(
-        len(rows),
-        time=rows[:, 0],
-        radar=radar,
-        scan=rows[:, 1],
-        east=rows[:, 2],
-        north=rows[:, 3],
-        covariance=rows[:, [4, 5, 5, 6]].reshape(-1, 2, 2),
-        range=rows[:, 7],
-        azimuth=rows[:, 8],
-        range_extent=rows[:, 9],
-        azimuth_extent=rows[:, 10],
-        length=rows[:, 11],
-        width=rows[:, 12],
-        cells=rows[:, 13],
-        mean_amplitude=rows[:, 14],
-        peak_amplitude=rows[:, 15],
-        bearing=rows[:, 16],
-        bearing_sd=rows[:, 17],
-        window=rows[:, 18:22],
-    )
+@dataclass(frozen=True, eq=False)
+class PlotColumns:
+    """Room for the columns of a table of plots, written by the kernels, handed on without a copy."""
+
+    wide: NDArray[np.float64]
+    narrow: NDArray[np.float32]
+    covariance: NDArray[np.float64]
+    window: NDArray[np.int32]
+
+    @classmethod
+    def room_for(cls, plots: int) -> PlotColumns:
+        """Columns that hold up to so many plots."""
+        return cls(
+            np.empty((len(WIDE), plots)),
+            np.empty((len(NARROW), plots), np.float32),
+            np.empty((plots, 2, 2)),
+            np.empty((plots, 4), np.int32),
+        )
+
+    @property
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """What the kernels take."""
+        return (
+            self.wide,
+            self.wide.view(np.int64),
+            self.narrow,
+            self.narrow.view(np.int32),
+            self.covariance,
+            self.window,
+        )
+
+    def table(self, radar: int, plots: int) -> Plots:
+        """The first so many rows as a table."""
+        made = dict(zip(WIDE, self.wide[:, :plots], strict=True)) | dict(
+            zip(NARROW, self.narrow[:, :plots], strict=True)
+        )
+        made["scan"] = made["scan"].view(np.int64)
+        made["cells"] = made["cells"].view(np.int32)
+        made |= {"covariance": self.covariance[:plots], "window": self.window[:plots]}
+        made |= {"radar": np.full(plots, radar, np.int16)}
+        made |= {"nose_known": np.zeros(plots, np.bool_), "type": np.zeros(plots, "U4")}
+        return Plots._of_good(made)
 
 
-@njit(nogil=True, cache=True)
-def measure_plot(root: int, runs: Any, turn: Any, constants: Any, sums: Any, out: Any) -> None:
-    """Fill one output row from a component.
+@njit(nogil=True, cache=True, _nrt=False, forceinline=True)
+def position_variance(total: int, ground: float, constants: Any) -> tuple[float, float, float, float]:
+    """How sure the centroid of `total` cells is at a ground range, from (share, along, across, independent).
 
-    root: its first run; the others follow in the NEXT column. turn: (3, azimuths) sine, cosine and time of each row's
-    sweep. Position: unweighted centroid of the cells on the ground. Covariance: the cells' own spread divided by the
-    number of independent parts, one resolution cell divided by the number of resolution cells, the quantisation of the
-    grid and GLINT. Axis: second moments of the cells (binary), resolution taken out; length and width: extent of the
-    cells along and across that axis, resolution taken out.
+    The covariance is share times the cells' own spread, plus the variances along and across the line of sight:
+    one resolution cell divided by the number of resolution cells, the quantisation of the grid, and GLINT. independent:
+    resolution cells in the plot.
     """
+    step, azimuth_step, beam = constants[3], constants[4], constants[5]
+    distance = max(ground, step)
+    independent = max(1.0, total * azimuth_step / beam)
+    one = 1 / independent
+    box_u = step * step / 12
+    box_v = (distance * beam) ** 2 / 12
+    grid_v = (distance * azimuth_step) ** 2 / 12
+    share = max(one, 1 / SCATTERERS)
+    return share, box_u * one + box_u / 12 + GLINT, box_v * one + grid_v / 12 + GLINT, independent
+
+
+@njit(nogil=True, cache=True, _nrt=False, forceinline=True)
+def measure_run(one: Any, turn: Any, geometry: Any, out: Any, at: int) -> None:
+    """Fill row `at` of the output from a plot of a single run, too small for an axis (see measure_plot)."""
+    constants, ground, sums = geometry
+    east, north, height, _, azimuth_step, _, _ = constants
+    wide, wide_int, narrow, narrow_int, covariance, window = out
+    start, end = np.int64(one.start), np.int64(one.end)
+    total = end - start
+    row = turn[one.row]
+    s, c = row[SINE], row[COSINE]
+    g, spread, mean, loud = ground[start], 0.0, np.float64(one.total), ground[start]
+    if total > 1:
+        part = 1.0 / total
+        g = (sums[0, end] - sums[0, start]) * part
+        spread = max((sums[1, end] - sums[1, start]) * part - g * g, 0.0)
+        mean *= part
+        loud = one.moment / one.weight
+    share, along, across, _ = position_variance(total, g, constants)
+    along += spread * share
+    wide[0, at] = row[TIME]
+    wide[1, at] = east + s * g
+    wide[2, at] = north + c * g
+    wide[3, at] = np.sqrt(g * g + height * height)
+    wide[4, at] = row[AZIMUTH]
+    wide[5, at] = east + s * loud
+    wide[6, at] = north + c * loud
+    wide_int[7, at] = np.int64(row[SCAN])
+    covariance[at, 0, 0] = along * s * s + across * c * c
+    covariance[at, 0, 1] = covariance[at, 1, 0] = (along - across) * s * c
+    covariance[at, 1, 1] = along * c * c + across * s * s
+    narrow[0, at] = total * constants[3]
+    narrow[1, at] = azimuth_step
+    narrow[2, at] = ground[end - 1] - ground[start]
+    narrow[3, at] = 0.0
+    narrow[4, at] = mean
+    narrow[5, at] = one.peak
+    narrow[6, at] = np.nan
+    narrow[7, at] = np.nan
+    narrow_int[8, at] = total
+    window[at, 0] = one.row
+    window[at, 1] = 1
+    window[at, 2] = start
+    window[at, 3] = total
+
+
+@njit(nogil=True, cache=True, _nrt=False)
+def measure_plot(root: int, newest: int, runs: Any, turn: Any, geometry: Any, out: Any, at: int) -> None:
+    """Fill row `at` of the output from a component.
+
+    root: its first run; the others follow by `next`. newest: absolute row of its last run. turn: (azimuths,
+    TURN_FIELDS), what is known of each row. Position: centroid of the cells on the ground, unweighted; the weighted one
+    has the linear amplitude (10 to the power of dB / 20) as weight. Covariance: see position_variance. Axis: second
+    moments of the cells (binary), resolution taken out; length and width: extent of the cells along and across that
+    axis, resolution taken out.
+    """
+    constants, ground_of, sums = geometry
     east, north, height, step, azimuth_step, beam, azimuths = constants
-    sine, cosine, times = turn[0], turn[1], turn[2]
-    total, amplitude, peak = 0, 0, 0
-    first_cell, last_cell = runs[root, START], runs[root, END]
-    t0 = times[runs[root, GRID]]
-    st = sx = sy = sxx = sxy = syy = sr = 0.0
-    run = root
-    while run >= 0:
-        a, b = runs[run, START], runs[run, END]
-        row = runs[run, GRID]
+    wide, wide_int, narrow, narrow_int, covariance, window = out
+    grid_rows = np.int64(azimuths)
+    total, amplitude, peak = np.int64(0), np.int64(0), np.int64(0)
+    first_cell, last_cell = np.int64(runs[root].start), np.int64(runs[root].end)
+    first_row = np.int64(runs[root].row)
+    rows = (np.int64(runs[root].last) - first_row) % grid_rows + 1
+    t0 = turn[first_row, TIME]
+    st = sx = sy = sxx = sxy = syy = sr = loud_x = loud_y = weight = 0.0
+    run = np.int64(root)
+    while True:
+        one = runs[run]
+        a, b = np.int64(one.start), np.int64(one.end)
+        row = np.int64(one.row)
         n = b - a
         total += n
-        amplitude += runs[run, SUM]
-        peak = max(peak, runs[run, PEAK])
+        amplitude += np.int64(one.total)
+        peak = max(peak, np.int64(one.peak))
         first_cell = min(first_cell, a)
         last_cell = max(last_cell, b)
         g1, g2 = sums[0, b] - sums[0, a], sums[1, b] - sums[1, a]
-        s, c = sine[row], cosine[row]
-        st += n * (times[row] - t0)
-        sr += n * (runs[run, ROW] - runs[root, FIRST])
+        here = turn[row]
+        s, c = here[SINE], here[COSINE]
+        away = row - first_row
+        away += grid_rows if away < 0 else 0
+        st += n * (here[TIME] - t0)
+        sr += n * away
         sx += s * g1
         sy += c * g1
         sxx += s * s * g2
         sxy += s * c * g2
         syy += c * c * g2
-        run = runs[run, NEXT]
-    mx, my = sx / total, sy / total
+        loud_x += s * one.moment
+        loud_y += c * one.moment
+        weight += one.weight
+        one.parent = FREE
+        run = np.int64(one.next)
+        if run == root:
+            break
+    part = 1.0 / total
+    mx, my = sx * part, sy * part
     ground = np.sqrt(mx * mx + my * my)
-    first_row = runs[root, GRID]
-    ux, uy = (mx / ground, my / ground) if ground > 0 else (sine[first_row], cosine[first_row])
-    cross = max(ground, step) * azimuth_step
-    resolution = max(ground, step) * beam
-    cxx, cxy, cyy = sxx / total - mx * mx, sxy / total - mx * my, syy / total - my * my
-    # a resolution cell and a grid cell as boxes along (u) and across (v) the line of sight
-    box_u, box_v = step * step / 12, resolution * resolution / 12
-    independent = max(1.0, total * cross / resolution)
-    grid_v = cross * cross / 12
-    var_u, var_v = box_u / independent + box_u / 12 + GLINT, box_v / independent + grid_v / 12 + GLINT
-    parts = min(independent, SCATTERERS)
-    out[4] = cxx / parts + var_u * ux * ux + var_v * uy * uy
-    out[5] = cxy / parts + (var_u - var_v) * ux * uy
-    out[6] = cyy / parts + var_u * uy * uy + var_v * ux * ux
+    s, c = turn[first_row, SINE], turn[first_row, COSINE]
+    ux, uy = (mx / ground, my / ground) if ground > 0 else (s, c)
+    cxx, cxy, cyy = sxx * part - mx * mx, sxy * part - mx * my, syy * part - my * my
+    share, along, across, independent = position_variance(total, ground, constants)
     # the beam widens the cells' cloud across the line of sight
-    excess = box_v - grid_v
+    cross, resolution = max(ground, step) * azimuth_step, max(ground, step) * beam
+    excess = (resolution * resolution - cross * cross) / 12
     dxx, dxy, dyy = cxx - excess * uy * uy, cxy + excess * ux * uy, cyy - excess * ux * ux
-    axis = 0.5 * np.arctan2(2 * dxy, dyy - dxx)
     half = np.sqrt((dyy - dxx) ** 2 + 4 * dxy * dxy) / 2
-    middle = (dxx + dyy) / 2
-    major, minor = middle + half, max(middle - half, box_u)
-    ax, ay = np.sin(axis), np.cos(axis)
+    # the axis' angle is half that of (dyy - dxx, 2 dxy)
+    double = (dyy - dxx) / (2 * half) if half > 0 else 1.0
+    ay = np.sqrt(max(0.5 + 0.5 * double, 0.0))
+    ax = np.copysign(np.sqrt(max(0.5 - 0.5 * double, 0.0)), dxy)
     low_a, high_a, low_b, high_b = np.inf, -np.inf, np.inf, -np.inf
-    run = root
-    while run >= 0:
-        row = runs[run, GRID]
+    while True:
+        one = runs[run]
+        here = turn[one.row]
+        on_a, on_b = here[SINE] * ax + here[COSINE] * ay, here[SINE] * ay - here[COSINE] * ax
         for edge in range(2):
-            j = runs[run, START] if edge == 0 else runs[run, END] - 1
-            g = sums[0, j + 1] - sums[0, j]
-            x, y = sine[row] * g - mx, cosine[row] * g - my
-            along, across = x * ax + y * ay, x * ay - y * ax
-            low_a = along if along < low_a else low_a
-            high_a = along if along > high_a else high_a
-            low_b = across if across < low_b else low_b
-            high_b = across if across > high_b else high_b
-        run = runs[run, NEXT]
+            j = np.int64(one.start) if edge == 0 else np.int64(one.end) - 1
+            along_axis, across_axis = ground_of[j] * on_a, ground_of[j] * on_b
+            low_a = min(low_a, along_axis)
+            high_a = max(high_a, along_axis)
+            low_b = min(low_b, across_axis)
+            high_b = max(high_b, across_axis)
+        run = np.int64(one.next)
+        if run == root:
+            break
     radial, tangential = abs(ax * ux + ay * uy), abs(ax * uy - ay * ux)
     # extent of the cells = extent of the target + resolution - grid, in the direction concerned
     length = max(0.0, high_a - low_a - tangential * (resolution - cross))
     width = max(0.0, high_b - low_b - radial * (resolution - cross))
-    bearing, deviation = np.nan, np.nan
-    if independent >= BEARING_CELLS and major > minor:
-        spread = major * minor / (independent * (major - minor) ** 2)
-        deviation = np.sqrt(spread + BEARING_FLOOR**2)
-        bearing = axis % np.pi
-        if deviation > BEARING_LIMIT:
-            bearing, deviation = np.nan, np.nan
-    azimuth = np.arctan2(ux, uy) % (2 * np.pi)
-    centre_row = runs[root, FIRST] + sr / total + 0.5
-    out[0] = t0 + st / total
-    out[1] = np.rint((centre_row - azimuth / azimuth_step) / azimuths)
-    out[2] = east + mx
-    out[3] = north + my
-    out[7] = np.sqrt(ground * ground + height * height)
-    out[8] = azimuth
-    out[9] = (last_cell - first_cell) * step
-    out[10] = (runs[root, LAST] - runs[root, FIRST] + 1) * azimuth_step
-    out[11] = max(length, width) if np.isnan(bearing) else length
-    out[12] = min(length, width) if np.isnan(bearing) else width
-    out[13] = total
-    out[14] = amplitude / total
-    out[15] = peak
-    out[16] = bearing
-    out[17] = deviation
-    out[18] = runs[root, FIRST] % np.int64(azimuths)
-    out[19] = runs[root, LAST] - runs[root, FIRST] + 1
-    out[20] = first_cell
-    out[21] = last_cell - first_cell
+    bearing, deviation = _axis(ax, ay, (dxx + dyy) / 2, half, step * step / 12, independent)
+    if np.isnan(bearing):
+        length, width = max(length, width), min(length, width)
+    azimuth = turn[first_row, AZIMUTH] + _small_angle(ux * c - uy * s, ux * s + uy * c)
+    azimuth += 2 * np.pi if azimuth < 0 else (-2 * np.pi if azimuth >= 2 * np.pi else 0.0)
+    centre_row = newest - rows + 1 + sr * part + 0.5
+    wide[0, at] = t0 + st * part
+    wide[1, at] = east + mx
+    wide[2, at] = north + my
+    wide[3, at] = np.sqrt(ground * ground + height * height)
+    wide[4, at] = azimuth
+    wide[5, at] = east + loud_x / weight
+    wide[6, at] = north + loud_y / weight
+    wide_int[7, at] = np.int64(np.rint((centre_row - azimuth / azimuth_step) / azimuths))
+    covariance[at, 0, 0] = cxx * share + along * ux * ux + across * uy * uy
+    covariance[at, 0, 1] = covariance[at, 1, 0] = cxy * share + (along - across) * ux * uy
+    covariance[at, 1, 1] = cyy * share + along * uy * uy + across * ux * ux
+    narrow[0, at] = (last_cell - first_cell) * step
+    narrow[1, at] = rows * azimuth_step
+    narrow[2, at] = length
+    narrow[3, at] = width
+    narrow[4, at] = amplitude * part
+    narrow[5, at] = peak
+    narrow[6, at] = bearing
+    narrow[7, at] = deviation
+    narrow_int[8, at] = total
+    window[at, 0] = first_row
+    window[at, 1] = rows
+    window[at, 2] = first_cell
+    window[at, 3] = last_cell - first_cell
+
+
+@njit(nogil=True, cache=True, _nrt=False, forceinline=True)
+def _axis(ax: float, ay: float, middle: float, half: float, least: float, independent: float) -> tuple[float, float]:
+    """Direction (0 .. pi) and standard deviation of the long axis; nan where the cells do not tell."""
+    major, minor = middle + half, max(middle - half, least)
+    if independent < BEARING_CELLS or major <= minor:
+        return np.nan, np.nan
+    deviation = np.sqrt(major * minor / (independent * (major - minor) ** 2) + BEARING_FLOOR**2)
+    if deviation > BEARING_LIMIT:
+        return np.nan, np.nan
+    return np.arctan2(ax, ay) % np.pi, deviation
+
+
+@njit(nogil=True, cache=True, _nrt=False, forceinline=True)
+def _small_angle(sine: float, cosine: float) -> float:
+    """arctan2; by its series where that is exact to rounding, as it is for all plots but the very near."""
+    if abs(sine) > 0.03 * cosine or cosine <= 0:
+        return np.arctan2(sine, cosine)
+    x = sine / cosine
+    y = x * x
+    return x * (1 - y * (1 / 3 - y * (1 / 5 - y * (1 / 7 - y / 9))))

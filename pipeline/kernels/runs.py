@@ -1,43 +1,159 @@
-"""A pool of runs of detected cells: one row of int64 a run, linked into components by union-find."""
+"""Runs of detected cells in one sweep, kept in the order in which they were swept and linked by union-find.
+
+A run is a record of 64 octets, one cache line. A run's index is its age, so the root of a component is its first run,
+and the oldest run that is still open tells from which row on the plots are not yet known.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numba import njit
 
-ROW, START, END, SUM, PEAK, REACH = 0, 1, 2, 3, 4, 5
-"""Absolute row (scan * azimuths + row); range cells [START, END); sum and peak of amplitude; greatest link distance."""
+from pipeline.kernels.bits import set_bits, trailing_zeros
 
-PARENT, NEXT, TAIL, FIRST, LAST = 6, 7, 8, 9, 10
-"""Union-find parent (FREE when unused); next run of the component (-1: none); valid in a root only: its last run, and
-the component's first and last absolute row."""
+RUN = np.dtype(
+    [
+        ("weight", "f8"),
+        ("moment", "f8"),
+        ("start", "i4"),
+        ("end", "i4"),
+        ("ring", "i4"),
+        ("row", "i4"),
+        ("parent", "i4"),
+        ("next", "i4"),
+        ("last", "i4"),
+        ("seeds", "i4"),
+        ("total", "i4"),
+        ("peak", "i4"),
+        ("spare", "i8"),
+    ]
+)
+"""weight, moment: sum over the cells of linear amplitude, and of it times ground range. start, end: range cells
+[start, end). ring: ring of the link rule. row: in the azimuth grid. parent: union-find (FREE: delivered). next: the
+next run of the component, which is a ring of runs. last: in a root, the component's last row in the grid. seeds: cells
+that the detector found. total, peak: sum and greatest of the log amplitudes."""
 
-GRID = 11
-"""The row in the azimuth grid, 0 .. azimuths - 1."""
-
-FIELDS = 12
 FREE = -1
 
 
-@njit(nogil=True, cache=True)
-def find(runs: Any, run: int) -> int:
-    """The root of a run's component, which is also the first of its list."""
-    while runs[run, PARENT] != run:
-        runs[run, PARENT] = runs[runs[run, PARENT], PARENT]
-        run = runs[run, PARENT]
-    return run
+@njit(nogil=True, cache=True, _nrt=False, forceinline=True)
+def find(runs: Any, run: Any) -> Any:
+    """The root of a run's component: its oldest run."""
+    while True:
+        parent = np.int64(runs[run].parent)
+        if parent == run:
+            return run
+        above = np.int64(runs[parent].parent)
+        runs[run].parent = above
+        run = above
 
 
-@njit(nogil=True, cache=True)
-def unite(runs: Any, a: int, b: int) -> None:
-    """Make one component of two runs' components; the root is the older, so that trees stay flat and lists in order."""
-    a, b = find(runs, a), find(runs, b)
-    if a == b:
-        return
-    if runs[b, FIRST] < runs[a, FIRST]:
+@njit(nogil=True, cache=True, _nrt=False, forceinline=True)
+def unite(runs: Any, a: Any, b: Any, row: Any) -> Any:
+    """Make one component of those of two different roots; row: the newest row, to which one of them belongs.
+
+    Gives the root of both.
+    """
+    if b < a:
         a, b = b, a
-    runs[b, PARENT] = a
-    runs[runs[a, TAIL], NEXT] = b
-    runs[a, TAIL] = runs[b, TAIL]
-    runs[a, LAST] = max(runs[a, LAST], runs[b, LAST])
+    runs[b].parent = a
+    after = runs[a].next
+    runs[a].next = runs[b].next
+    runs[b].next = after
+    runs[a].last = row
+    return a
+
+
+@njit(nogil=True, cache=True, _nrt=False, forceinline=True)
+def any_bit(bits: Any, first: Any, last: Any) -> bool:
+    """Whether any of the bits first .. last (both included) of a row of words is set."""
+    w, stop = first >> 6, last >> 6
+    everything = np.uint64(0xFFFFFFFFFFFFFFFF)
+    low = everything << np.uint64(first & 63)
+    high = everything >> np.uint64(63 - (last & 63))
+    if w == stop:
+        return bool(bits[w] & low & high)
+    if bits[w] & low:
+        return True
+    w += 1
+    while w < stop:
+        if bits[w]:
+            return True
+        w += 1
+    return bool(bits[stop] & high)
+
+
+@njit(nogil=True, cache=True, _nrt=False)
+def count_set(bits: Any, start: int, end: int) -> int:
+    """How many of the bits start .. end - 1 of a row of words are set."""
+    found = np.int64(0)
+    everything = np.uint64(0xFFFFFFFFFFFFFFFF)
+    for w in range(start >> 6, ((end - 1) >> 6) + 1):
+        word = bits[w]
+        if w == start >> 6:
+            word &= everything << np.uint64(start & 63)
+        if w == (end - 1) >> 6:
+            word &= everything >> np.uint64(63 - ((end - 1) & 63))
+        found += np.int64(set_bits(word))
+    return found
+
+
+@njit(nogil=True, cache=True, _nrt=False)
+def find_runs(
+    bits: Any, seeds: Any, grown: bool, cells: Any, row: int, rule: Any, scale: Any, runs: Any, head: int, room: int
+) -> tuple[int, int]:
+    """Append the runs of one row to the pool, those linked within the row united. Gives the new head and how many runs
+    there was no room for.
+
+    bits, seeds: (words) cells of plots, and those of them that the detector found (the same unless `grown`). row: in
+    the azimuth grid. rule: (ring_of_cell, ring_stop, reach) of a LinkRule. scale: (loudness, ground) of a Geometry.
+    """
+    ring_of_cell, ring_stop, reach = rule
+    loudness, ground = scale
+    one, top = np.uint64(1), np.uint64(63)
+    first, stop = head, head + room
+    ranges = cells.size
+    dropped = 0
+    begun = np.int64(-1)
+    carry = np.uint64(0)
+    for w in range(bits.size + 1):
+        word = bits[w] if w < bits.size else np.uint64(0)
+        turns = word ^ ((word << one) | carry)
+        carry = word >> top
+        while turns:
+            at = min(64 * w + np.int64(trailing_zeros(turns)), ranges)
+            turns &= turns - one
+            if begun < 0:
+                begun = at
+                continue
+            while begun < at:
+                ring = ring_of_cell[begun]
+                end = min(at, ring_stop[ring])
+                if head == stop:
+                    dropped += 1
+                    begun = end
+                    continue
+                total, peak = np.int64(0), np.int64(0)
+                weight, moment = 0.0, 0.0
+                for j in range(begun, end):
+                    value = np.int64(cells[j])
+                    total += value
+                    peak = max(peak, value)
+                    loud = loudness[value]
+                    weight += loud
+                    moment += loud * ground[j]
+                run = runs[head]
+                run.weight, run.moment = weight, moment
+                run.start, run.end, run.ring, run.row = begun, end, ring, row
+                run.parent, run.next, run.last = head, head, row
+                run.seeds = count_set(seeds, begun, end) if grown else end - begun
+                run.total, run.peak = total, peak
+                # the neighbour in the row is enough: the reach falls with range, so what links over a run links to it
+                if head > first and begun - (runs[head - 1].end - 1) <= reach[ring, 0]:
+                    unite(runs, find(runs, head - 1), head, row)
+                head += 1
+                begun = end
+            begun = np.int64(-1)
+    return head, dropped

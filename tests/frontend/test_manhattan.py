@@ -52,8 +52,8 @@ def test_equal_to_brute_force_over_the_seam_at_north(
     cells = np.random.default_rng(seed).random((2, 30, ranges)) < density
     state = part.start(site(video))
     plots = plots_of(part, strip(np.full(cells.shape, 7, np.uint8), video), list(cells), state)
-    components = m_graph_components(cells.reshape(60, ranges), state.reach_of_cell[:-1])
-    if max(max(i for i, _ in one) - min(i for i, _ in one) for one in components or [[(0, 0)]]) < state.most_rows - 1:
+    components = m_graph_components(cells.reshape(60, ranges), state.rule.reach[state.rule.ring_of_cell, 0])
+    if max(max(i for i, _ in one) - min(i for i, _ in one) for one in components or [[(0, 0)]]) < state.limits[1] - 1:
         assert summary(plots) == expected(components, 30)
     assert plots.cells.sum() == cells.sum()
 
