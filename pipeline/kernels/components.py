@@ -4,9 +4,11 @@ join.
 All rows are absolute (scan * azimuths + row), so north is a row like any other. The newest `rule.rows` rows are the
 window that a new run may link to; a component is complete when its last row leaves it.
 
-An extractor gives a `LinkRule` and, with every block, detections: `ComponentState.of` makes the state, `take_block`
-and `flush` give plots. With a `GrowthWindow` (see `pipeline.kernels.growth`) plots are made of the cells of
-`Detections.growth` near detected ones, and what holds no detected cell is left out and counted.
+How to use it: make a `LinkRule` (a table of how far apart two cells of a plot may lie) and
+`ComponentState.of(site, rule, ...)`; then `take_block(sweeps, detections, state)` and `flush(state)` give plots.
+To grow plots out of detected cells make a `GrowthWindow` and a `GrowthState.growing(site, rule, window, ...)`; then
+`take_grown_block` and `flush_grown` (all in `pipeline.kernels.growth`) use the cells of `Detections.growth` near
+detected ones, and what holds no detected cell is left out and counted.
 """
 
 from __future__ import annotations
@@ -15,10 +17,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.kernels.bits import borrowed
+from pipeline.kernels.compiled import inlined, kernel
 from pipeline.kernels.links import LinkRule
 from pipeline.kernels.plot_shape import (
     AZIMUTH,
@@ -169,7 +171,7 @@ def flush(state: ComponentState) -> Plots:
     return columns.table(int(state.radar[0]), int(count))
 
 
-@njit(nogil=True, cache=True, _nrt=False)
+@kernel()
 def _take_rows(
     block: Any, first_row: int, azimuths: int, rule: Any, limits: Any, pool: Any, scale: Any, out: Any
 ) -> Any:
@@ -207,13 +209,13 @@ def _take_rows(
     return count
 
 
-@njit(nogil=True, cache=True, _nrt=False, forceinline=True)
+@inlined()
 def open_runs(numbers: Any) -> Any:
     """Runs in the rows of open plots: no more plots than these can become complete before the next row is taken."""
     return numbers[HEAD] - numbers[TAIL]
 
 
-@njit(nogil=True, cache=True, _nrt=False)
+@kernel()
 def note_row(row: int, grid_row: int, azimuth: float, time: float, constants: Any, turn: Any) -> None:
     """Remember when and where a row with runs was swept."""
     here = turn[grid_row]
@@ -225,7 +227,7 @@ def note_row(row: int, grid_row: int, azimuth: float, time: float, constants: An
     here[SCAN] = np.rint((row + 0.5 - here[AZIMUTH] / constants[4]) / constants[6])
 
 
-@njit(nogil=True, cache=True, _nrt=False)
+@kernel()
 def take_row(
     row: int,
     grid_row: int,
@@ -259,7 +261,7 @@ def take_row(
     _link_rows(row, grid_row, azimuths, first, head, limits[1], rule[2], pool)
 
 
-@njit(nogil=True, cache=True, _nrt=False)
+@kernel()
 def _link_rows(
     row: int, grid_row: int, azimuths: int, first: int, head: int, most_rows: int, reach: Any, pool: Any
 ) -> None:
@@ -292,7 +294,7 @@ def _link_rows(
                     mine = unite(runs, mine, other, grid_row)
 
 
-@njit(nogil=True, cache=True, _nrt=False)
+@kernel()
 def _move_down(runs: Any, window: Any, numbers: Any) -> None:
     by, head = numbers[TAIL], numbers[HEAD]
     for k in range(by, head):
@@ -307,7 +309,7 @@ def _move_down(runs: Any, window: Any, numbers: Any) -> None:
     numbers[HEAD] = head - by
 
 
-@njit(nogil=True, cache=True, _nrt=False)
+@kernel()
 def retire(
     row: int, azimuths: int, reach_rows: int, limits: Any, pool: Any, geometry: Any, out: Any, count: int
 ) -> Any:
@@ -357,8 +359,8 @@ def retire(
     return count
 
 
-@njit(nogil=True, cache=True, _nrt=False, forceinline=True)
-def _sizes(root: int, runs: Any) -> tuple[int, int]:
+@inlined()
+def _sizes(root: int, runs: Any) -> Any:
     total = seeds = np.int64(0)
     run = np.int64(root)
     while True:
@@ -369,7 +371,7 @@ def _sizes(root: int, runs: Any) -> tuple[int, int]:
             return total, seeds
 
 
-@njit(nogil=True, cache=True, _nrt=False)
+@kernel()
 def _free(root: int, runs: Any) -> None:
     run = np.int64(root)
     while True:

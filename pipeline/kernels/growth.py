@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.kernels.bits import count_runs
+from pipeline.kernels.compiled import kernel
 from pipeline.kernels.components import NEWEST, TAKEN, ComponentState, flush, note_row, open_runs, retire, take_row
 from pipeline.kernels.links import LinkRule
 from pipeline.kernels.run_cap import CapSettings
@@ -156,7 +156,7 @@ def _run(block: tuple[NDArray[Any], ...], first_row: int, state: GrowthState) ->
     return Plots.concatenate(made)
 
 
-@njit(nogil=True, cache=True, _nrt=False)
+@kernel()
 def _take_rows(
     block: Any,
     first_row: int,
@@ -204,7 +204,7 @@ def _take_rows(
     return count
 
 
-@njit(nogil=True, cache=True, _nrt=False)
+@kernel()
 def _arrive(row: int, at: int, seeds: Any, growth: Any, azimuth: float, time: float, near: Any, held: Any) -> None:
     _, held_bits, held_seeds, held_active, held_sweep, held_row, until, marks, _, _, _, waiting = held
     places = held_row.size - 1
@@ -228,7 +228,7 @@ def _arrive(row: int, at: int, seeds: Any, growth: Any, azimuth: float, time: fl
             until[v] = row + near[v]
 
 
-@njit(nogil=True, cache=True, _nrt=False)
+@kernel()
 def _look_to(
     last: int,
     amplitude: Any,
@@ -268,7 +268,7 @@ def _look_to(
     return count, True
 
 
-@njit(nogil=True, cache=True, _nrt=False)
+@kernel()
 def _choose(row: int, slot: int, box: Any, held: Any) -> bool:
     """Write the cells of the row that count to the scratch row; False when there are none."""
     held_bits, held_seeds, held_active = held[1], held[2], held[3]
@@ -288,10 +288,10 @@ def _choose(row: int, slot: int, box: Any, held: Any) -> bool:
         for w in range(bits.size):
             bits[w] = kept[w]
             anything |= bits[w]
-    return anything != 0
+    return bool(anything)
 
 
-@njit(nogil=True, cache=True, _nrt=False)
+@kernel()
 def _copy_words(source: Any, active: Any, all_words: bool, cells: Any) -> None:
     for w in range(active.size):
         if all_words or active[w]:

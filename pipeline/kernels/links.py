@@ -42,7 +42,7 @@ class LinkRule:
     @property
     def rows(self) -> int:
         """The greatest row distance at which cells link."""
-        return self.reach.shape[1] - 1
+        return int(self.reach.shape[1]) - 1
 
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:

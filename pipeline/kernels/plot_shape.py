@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from pipeline.kernels.compiled import inlined, kernel
 from pipeline.kernels.runs import FREE
 from pipeline.sites import RadarSite
 from pipeline.tables import Plots
@@ -117,7 +117,7 @@ class PlotColumns:
         return Plots._of_good(made)
 
 
-@njit(nogil=True, cache=True, _nrt=False, forceinline=True)
+@inlined()
 def position_variance(total: int, ground: float, constants: Any) -> tuple[float, float, float, float]:
     """How sure the centroid of `total` cells is at a ground range, from (share, along, across, independent).
 
@@ -136,7 +136,7 @@ def position_variance(total: int, ground: float, constants: Any) -> tuple[float,
     return share, box_u * one + box_u / 12 + GLINT, box_v * one + grid_v / 12 + GLINT, independent
 
 
-@njit(nogil=True, cache=True, _nrt=False, forceinline=True)
+@inlined()
 def measure_run(one: Any, turn: Any, geometry: Any, out: Any, at: int) -> None:
     """Fill row `at` of the output from a plot of a single run, too small for an axis (see measure_plot)."""
     constants, ground, sums = geometry
@@ -181,7 +181,7 @@ def measure_run(one: Any, turn: Any, geometry: Any, out: Any, at: int) -> None:
     window[at, 3] = total
 
 
-@njit(nogil=True, cache=True, _nrt=False)
+@kernel()
 def measure_plot(root: int, newest: int, runs: Any, turn: Any, geometry: Any, out: Any, at: int) -> None:
     """Fill row `at` of the output from a component.
 
@@ -298,7 +298,7 @@ def measure_plot(root: int, newest: int, runs: Any, turn: Any, geometry: Any, ou
     window[at, 3] = last_cell - first_cell
 
 
-@njit(nogil=True, cache=True, _nrt=False, forceinline=True)
+@inlined()
 def _axis(ax: float, ay: float, middle: float, half: float, least: float, independent: float) -> tuple[float, float]:
     """Direction (0 .. pi) and standard deviation of the long axis; nan where the cells do not tell."""
     major, minor = middle + half, max(middle - half, least)
@@ -310,8 +310,8 @@ def _axis(ax: float, ay: float, middle: float, half: float, least: float, indepe
     return np.arctan2(ax, ay) % np.pi, deviation
 
 
-@njit(nogil=True, cache=True, _nrt=False, forceinline=True)
-def _small_angle(sine: float, cosine: float) -> float:
+@inlined()
+def _small_angle(sine: float, cosine: float) -> Any:
     """arctan2; by its series where that is exact to rounding, as it is for all plots but the very near."""
     if abs(sine) > 0.03 * cosine or cosine <= 0:
         return np.arctan2(sine, cosine)

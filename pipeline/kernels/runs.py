@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from pipeline.kernels.bits import set_bits, trailing_zeros
+from pipeline.kernels.compiled import inlined, kernel
 
 RUN = np.dtype(
     [
@@ -38,7 +38,7 @@ that the detector found. total, peak: sum and greatest of the log amplitudes."""
 FREE = -1
 
 
-@njit(nogil=True, cache=True, _nrt=False, forceinline=True)
+@inlined()
 def find(runs: Any, run: Any) -> Any:
     """The root of a run's component: its oldest run."""
     while True:
@@ -50,7 +50,7 @@ def find(runs: Any, run: Any) -> Any:
         run = above
 
 
-@njit(nogil=True, cache=True, _nrt=False, forceinline=True)
+@inlined()
 def unite(runs: Any, a: Any, b: Any, row: Any) -> Any:
     """Make one component of those of two different roots; row: the newest row, to which one of them belongs.
 
@@ -66,7 +66,7 @@ def unite(runs: Any, a: Any, b: Any, row: Any) -> Any:
     return a
 
 
-@njit(nogil=True, cache=True, _nrt=False, forceinline=True)
+@inlined()
 def any_bit(bits: Any, first: Any, last: Any) -> bool:
     """Whether any of the bits first .. last (both included) of a row of words is set."""
     w, stop = first >> 6, last >> 6
@@ -85,8 +85,8 @@ def any_bit(bits: Any, first: Any, last: Any) -> bool:
     return bool(bits[stop] & high)
 
 
-@njit(nogil=True, cache=True, _nrt=False)
-def count_set(bits: Any, start: int, end: int) -> int:
+@kernel()
+def count_set(bits: Any, start: int, end: int) -> Any:
     """How many of the bits start .. end - 1 of a row of words are set."""
     found = np.int64(0)
     everything = np.uint64(0xFFFFFFFFFFFFFFFF)
@@ -100,7 +100,7 @@ def count_set(bits: Any, start: int, end: int) -> int:
     return found
 
 
-@njit(nogil=True, cache=True, _nrt=False)
+@kernel()
 def find_runs(
     bits: Any, seeds: Any, grown: bool, cells: Any, row: int, rule: Any, scale: Any, runs: Any, head: int, room: int
 ) -> tuple[int, int]:

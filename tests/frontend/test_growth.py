@@ -135,5 +135,5 @@ def test_growth_joins_two_detected_cells_and_alone_is_nothing() -> None:
 
 @pytest.mark.parametrize("table", [[[1, 1], [1, 2]], [[1, 0], [2, 0]], [[0, 0], [0, 0]], [[2, -2], [2, -2]]])
 def test_a_rule_that_does_not_fall_is_refused(table: Any) -> None:
-    with pytest.raises(ValueError, match="reach|neighbours"):
+    with pytest.raises(ValueError, match=r"reach|neighbours"):
         LinkRule.of(np.array(table))
