@@ -62,7 +62,7 @@ def evaluate(
     except KeyboardInterrupt:
         raise fail("stopped; nothing is written", code=130) from None
     if failed:
-        raise fail(f"failed: {', '.join(failed)}", code=1)
+        raise fail(f"could not be carried out: {', '.join(failed)}", code=1)
 
 
 def _one_thread_each() -> None:

@@ -87,7 +87,7 @@ def _body(run: Run) -> str:
     head = [("", ""), ("paper", "n"), ("ours", "n"), ("95 % interval", ""), ("unit", "")]
     head += [("ours beside it", "")] if compared else []
     head += [("verdict", "")]
-    head += [("wanted", "n"), ("", "")] if asked else []
+    head += [("wanted", "")] if asked else []
     facts = {"trials": run.trials, "seed": run.seed, "took": words.duration(run.seconds)}
     facts |= words.settings_of(run.experiment)
     listed = "".join(f"<dt>{escape(k)}</dt><dd>{escape(words.said(v))}</dd>" for k, v in facts.items())
@@ -115,7 +115,7 @@ def _row(row: Row, asked: bool, compared: bool) -> str:
         cells.append(f'<td class="gauge">{gauge(row)}</td>')
     cells.append(f"<td>{_chip(row.verdict)}</td>")
     if asked:
-        cells += [f'<td class="n">{words.wanted(row)}</td>', f"<td>{_chip(words.met(row))}</td>"]
+        cells.append(f'<td class="wanted">{words.wanted(row)} {_chip(words.met(row))}</td>')
     return f"<tr>{''.join(cells)}</tr>\n"
 
 

@@ -74,7 +74,8 @@ def looks(lines: tuple[Line, ...]) -> list[Look]:
         else:
             k = next(number for number, one in enumerate(own) if one is line)
             dash = ((), (6.0, 2.5), (2.0, 2.0))[k // SERIES % 3] if line.style == "line" else ()
-            made.append(Look(f"#0a0c0{k % SERIES}", dash, _MARKERS[k % len(_MARKERS)], 2.0))
+            marked = line.style == "points" or len(line.x) <= MARKED
+            made.append(Look(f"#0a0c0{k % SERIES}", dash, _MARKERS[k % len(_MARKERS)] if marked else "", 2.0))
     return made
 
 
@@ -83,7 +84,9 @@ def svg(figure: Figure, salt: str) -> str:
     with mpl.rc_context({**_STYLE, "svg.hashsalt": salt}):
         canvas = _pictures(figure) if figure.pictures else _lines(figure)
         out = io.StringIO()
-        canvas.savefig(out, format="svg", transparent=True, dpi=160, metadata={"Date": None, "Creator": None})
+        canvas.savefig(
+            out, format="svg", transparent=True, dpi=160, metadata={"Date": None, "Creator": None}, bbox_inches="tight"
+        )
     return _inline(out.getvalue(), figure)
 
 
@@ -106,7 +109,6 @@ def _lines(figure: Figure) -> Canvas:
 
 def _draw(axes: Axes, line: Line, look: Look, log_y: bool) -> None:
     x, y = np.asarray(line.x, np.float64), np.asarray(line.y, np.float64)
-    marker = look.marker if line.style in ("points", "paper") or len(x) <= MARKED else ""
     banded = line.low is not None and line.high is not None
     if banded and line.style == "points":
         low, high = np.asarray(line.low, np.float64), np.asarray(line.high, np.float64)
@@ -126,7 +128,7 @@ def _draw(axes: Axes, line: Line, look: Look, log_y: bool) -> None:
         color=look.colour,
         linewidth=look.width,
         linestyle="none" if line.style == "points" else (0, look.dash) if look.dash else "-",
-        marker=marker,
+        marker=look.marker,
         markersize=5.5,
         markerfacecolor="none" if line.style == "paper" else look.colour,
         zorder=2.5 if line.style == "bound" else 3,
@@ -158,7 +160,7 @@ def _pictures(figure: Figure) -> Canvas:
             marks = np.asarray(picture.marks, np.float64)
             axes.plot(marks[:, 0], marks[:, 1], "+", color="#ff4d4f", markersize=9, markeredgewidth=1.6)
         if values.dtype != bool:
-            bar = canvas.colorbar(drawn, ax=axes, fraction=0.046, pad=0.02)
+            bar = canvas.colorbar(drawn, cax=axes.inset_axes((1.025, 0.0, 0.03, 1.0)))
             bar.set_label(_text(picture.unit))
             bar.outline.set_visible(False)
     return canvas

@@ -9,6 +9,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from typing import Any, Literal
 
 import joblib
@@ -77,7 +78,9 @@ def carry_out(
     try:
         with _workers(backend, jobs, experiment.trials):
             tasks = (joblib.delayed(one_trial)(experiment, seed, number) for number in range(experiment.trials))
-            for number, result in joblib.Parallel(return_as="generator_unordered")(tasks):
+            with _interrupts_held():
+                finished = joblib.Parallel(return_as="generator_unordered")(tasks)
+            for number, result in finished:
                 found[number] = result
                 done(len(found))
     except TrialError as error:
@@ -105,6 +108,19 @@ def one_trial(experiment: Experiment, seed: int, number: int) -> tuple[int, Tria
         raise TrialError(number, f"{type(error).__name__}: {error}", traceback.format_exc()) from None
 
 
+def usable_backend(name: str) -> Backend:
+    """The backend called `name`. Raises ValueError when there is none, or when what it needs is not installed."""
+    for backend in BACKENDS:
+        if backend == name:
+            if name == "dask" and importlib.util.find_spec("distributed") is None:
+                raise ValueError(
+                    "--backend dask needs dask and distributed, the extra `cluster`:"
+                    " uv pip install --python .venv/bin/python -e '.[cluster]'; loky, the default, needs nothing more"
+                )
+            return backend
+    raise ValueError(f"--backend {name}: there are {', '.join(BACKENDS)}")
+
+
 @contextlib.contextmanager
 def _explained(what: str) -> Iterator[None]:
     try:
@@ -115,30 +131,32 @@ def _explained(what: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _workers(backend: Backend, jobs: int, trials: int) -> Iterator[None]:
-    """Whoever works: one thread each, and deaf to Ctrl-C, which is this process's to answer."""
+    """Whoever works, one thread each."""
     jobs = max(1, min(jobs, trials))
     if backend == "dask":
         with _dask_client(jobs) as client, joblib.parallel_config("dask", client=client):
             yield
     elif backend == "loky" and jobs > 1:
-        with joblib.parallel_config("loky", n_jobs=jobs, inner_max_num_threads=1, initializer=_deaf):
+        with joblib.parallel_config("loky", n_jobs=jobs, inner_max_num_threads=1):
             yield
     else:
         with joblib.parallel_config("threading", n_jobs=jobs):
             yield
 
 
-def _deaf() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+@contextlib.contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Ctrl-C waits until processes are started: they inherit that, and leave it to this one to answer."""
+    resource_tracker.ensure_running()  # to start it later would let the interrupts through again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _dask_client(jobs: int) -> Any:
     """A cluster's client: the one at DASK_SCHEDULER_ADDRESS, or one made here of `jobs` processes."""
-    if importlib.util.find_spec("distributed") is None:
-        raise EvaluationError(
-            "the dask backend needs the extra `cluster`: uv pip install --python .venv/bin/python -e '.[cluster]'"
-            " (or pip install 'dask[distributed]'); --backend loky needs nothing"
-        )
     from dask import config
     from distributed import Client
 

@@ -7,7 +7,6 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
 
 import joblib
 from rich.console import Console
@@ -17,7 +16,7 @@ from app.evaluate.choose import ALL, choose
 from app.evaluate.circumstances import Circumstances, circumstances
 from app.evaluate.documents import document, json_text, markdown, write_whole
 from app.evaluate.recorded import recorded_video
-from app.evaluate.runs import BACKENDS, Backend, EvaluationError, Run, carry_out
+from app.evaluate.runs import EvaluationError, Run, carry_out, usable_backend
 from app.evaluate.table import summary, told
 from pipeline.evaluate import Experiment
 
@@ -41,8 +40,7 @@ class Options:
     report: Path | None = None
 
     def __post_init__(self) -> None:
-        if self.backend not in BACKENDS:
-            raise ValueError(f"--backend {self.backend}: there are {', '.join(BACKENDS)}")
+        usable_backend(self.backend)
         for path in (self.json, self.markdown):
             if path is not None and path.is_dir():
                 raise ValueError(f"{path} is a folder; a file is wanted")
@@ -119,7 +117,7 @@ def _with_progress(console: Console, label: str, name: str, experiment: Experime
             experiment,
             seed=options.seed,
             jobs=jobs,
-            backend=cast(Backend, options.backend),
+            backend=usable_backend(options.backend),
             quick=options.quick,
             done=lambda finished: progress.update(task, completed=finished),
         )

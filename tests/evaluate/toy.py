@@ -131,4 +131,11 @@ class Circumstance(Toy):
         return ()
 
 
-TOYS: dict[str, type[Any]] = {"toy": Toy}
+TOYS: dict[str, type[Any]] = {
+    "toy": Toy,
+    "failing": Failing,
+    "dying": Dying,
+    "slow": Slow,
+    "filmed": Filmed,
+    "circumstance": Circumstance,
+}
