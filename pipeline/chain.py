@@ -44,7 +44,7 @@ class RadarChain:
         self.time = float("nan")
         self.timings: dict[str, float] = {}
         self._clock = clock
-        self._detecting = detector.start(site.video, surface)
+        self._detecting = detector.start(site.video, surface, growth_db=getattr(extractor, "growth_db", None))
         self._extracting = extractor.start(site)
         self._surface = "none" if surface is None else f"{zlib.crc32(np.ascontiguousarray(surface).tobytes()):08x}"
         self._next_row = -1

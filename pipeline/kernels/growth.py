@@ -1,8 +1,9 @@
-"""Growth of plots out of detected cells: cells over a lower threshold count where a detected cell is near.
+"""Growth of plots out of detected cells: a cell over a lower threshold counts where a detected cell is near.
 
-Near is a box: so many azimuth rows before and after the cell, and its word of 64 range cells and the two beside it. So
-a row can be looked at only when the rows after it are known, and plots come later by the height of the box. The result
-does not depend on how the sweeps were cut into blocks.
+Near is what links the cells of plots, too: at most so many azimuth rows away, in the same range cell or the next. So
+growth reaches no further than that from a detected cell and cannot wander through clutter, of which some percent of the
+cells lie over the lower threshold. A row can be looked at only when the rows after it are known, and plots come later
+by the height of the window. The result does not depend on how the sweeps were cut into blocks.
 """
 
 from __future__ import annotations
@@ -22,27 +23,30 @@ from pipeline.sites import RadarSite
 from pipeline.state import read_only, remembered
 from pipeline.tables import Detections, Plots, Sweeps, VideoFormat
 
-ARRIVED, PENDING, FILLED, SKIPPED = range(4)
+ARRIVED, PENDING, FILLED, SEEDED, SKIPPED = range(5)
 """Places in `GrowthState.marks`: newest row that came in, first row not yet looked at, row up to which the bucket of
-runs was filled, and a count."""
+runs was filled, newest row with detected cells, and a count."""
 
 
 @dataclass(frozen=True, eq=False)
 class GrowthWindow:
-    """rows: (words) how many rows before and after a detected cell growth is looked at, in each word of 64 range cells.
-    max_runs: cap on the runs that grow in a turn; a row that does not fit keeps its detected cells only, counted.
+    """masks: (rows + 1, words) the range cells at which a cell that many rows away is near. words: (rows + 1) of them
+    with such cells. max_runs: cap on the runs that grow in a turn; a row that does not fit keeps its detected cells
+    only, counted.
     """
 
-    rows: NDArray[np.int64]
+    masks: NDArray[np.uint64]
+    words: NDArray[np.int64]
     max_runs: int
 
     @classmethod
-    def of(cls, video: VideoFormat, near_m: float, most_rows: int, max_runs: int) -> GrowthWindow:
-        """Rows that cover near_m metres at each word's middle, at least one and no more than most_rows."""
-        middle = video.first_range_m + video.range_step_m * (64 * np.arange(video.words) + 32)
-        rows = np.ceil(near_m / np.maximum(middle, video.range_step_m) / video.azimuth_step_rad)
-        most = max(1, min(most_rows, video.azimuths // 8))
-        return cls(np.clip(rows, 1, most).astype(np.int64), max_runs)
+    def of(cls, video: VideoFormat, rule: LinkRule, max_runs: int) -> GrowthWindow:
+        """The window that links the cells of plots: for a rule over no more than the next range cell."""
+        near = np.zeros((rule.rows + 1, 64 * video.words), np.bool_)
+        near[:, : video.ranges] = (rule.reach[rule.ring_of_cell] >= 0).T
+        masks = np.packbits(near, axis=1, bitorder="little").view(np.uint64)
+        words = np.array([np.flatnonzero(one)[-1] + 1 if one.any() else 0 for one in masks], np.int64)
+        return cls(masks, words, max_runs)
 
 
 @dataclass(eq=False, kw_only=True)
@@ -54,10 +58,9 @@ class GrowthState(ComponentState):
     held_cells: NDArray[np.uint8] = remembered()
     held_bits: NDArray[np.uint64] = remembered()
     held_seeds: NDArray[np.uint64] = remembered()
-    held_active: NDArray[np.bool_] = remembered()
+    held_near: NDArray[np.uint64] = remembered()
     held_sweep: NDArray[np.float64] = remembered()
     held_row: NDArray[np.int64] = remembered()
-    until: NDArray[np.int64] = remembered()
     marks: NDArray[np.int64] = remembered()
     budget: NDArray[np.float64] = remembered()
 
@@ -65,7 +68,7 @@ class GrowthState(ComponentState):
     def growing(cls, site: RadarSite, rule: LinkRule, near: GrowthWindow, **limits: Any) -> GrowthState:
         """A state in which nothing is open. limits: as in ComponentState.of."""
         video = site.video
-        slots = 1 << (int(near.rows.max()) + 1).bit_length()
+        slots = 1 << len(near.words).bit_length()
         made = cls.of(
             site,
             rule,
@@ -74,11 +77,10 @@ class GrowthState(ComponentState):
             held_cells=np.zeros((slots, video.ranges), np.uint8),
             held_bits=np.zeros((slots, video.words), np.uint64),
             held_seeds=np.zeros((slots, video.words), np.uint64),
-            held_active=np.zeros((slots, video.words), np.bool_),
+            held_near=np.zeros((slots, video.words), np.uint64),
             held_sweep=np.zeros((slots, 2)),
             held_row=np.full(slots, -1, np.int64),
-            until=np.full(video.words, -1, np.int64),
-            marks=np.array([-1, 0, 0, 0], np.int64),
+            marks=np.array([-1, 0, 0, -1, 0], np.int64),
             budget=np.array([CapSettings.of(near.max_runs, video.azimuths).depth]),
             **limits,
         )
@@ -93,14 +95,14 @@ class GrowthState(ComponentState):
     @property
     def held(self) -> tuple[Any, ...]:
         """What the kernels change."""
-        rows = (self.held_cells, self.held_bits, self.held_seeds, self.held_active, self.held_sweep, self.held_row)
-        return (*rows, self.until, self.marks, self.budget, *self.scratch)
+        rows = (self.held_cells, self.held_bits, self.held_seeds, self.held_near, self.held_sweep, self.held_row)
+        return (*rows, self.marks, self.budget, *self.scratch)
 
     @property
     def box(self) -> tuple[Any, ...]:
-        """Height of the box in each word, greatest height, and the bucket."""
+        """The window, and the bucket."""
         cap = CapSettings.of(self.near.max_runs, self.azimuths)
-        return self.near.rows, int(self.near.rows.max()), cap.refill, cap.depth
+        return self.near.masks, self.near.words, cap.refill, cap.depth
 
 
 def take_grown_block(sweeps: Sweeps, detections: Detections, state: GrowthState) -> Plots:
@@ -170,9 +172,9 @@ def _take_rows(
     held: Any,
 ) -> int:
     mask, growth, amplitude, rows, azimuth, times = block
-    held_row, marks, waiting = held[5], held[7], held[11]
+    held_row, marks, waiting = held[5], held[6], held[10]
     numbers = pool[3]
-    delay = box[1]
+    delay = box[1].size - 1
     count = 0
     done = numbers[TAKEN]
     while done < rows.size:
@@ -183,7 +185,7 @@ def _take_rows(
             )
             if not whole:
                 break
-            _arrive(row, done, mask[done], growth[done], azimuth[done], times[done], box[0], held)
+            _arrive(row, done, mask[done], growth[done], azimuth[done], times[done], box, held)
         count, whole = _look_to(row - delay, amplitude, azimuths, rule, limits, pool, scale, out, box, held, count)
         if not whole:
             break
@@ -197,7 +199,7 @@ def _take_rows(
             count = retire(numbers[NEWEST], azimuths, rule[2].shape[1] - 1, limits, pool, geometry, out, count)
             for slot in range(held_row.size):
                 if waiting[slot] >= 0 and held_row[slot] >= marks[PENDING]:
-                    _copy_words(amplitude[waiting[slot]], held[3][slot], True, held[0][slot])
+                    _copy_words(amplitude[waiting[slot]], held[1][slot], True, held[0][slot])
                 waiting[slot] = -1
             done += 1
     numbers[TAKEN] = done
@@ -205,27 +207,46 @@ def _take_rows(
 
 
 @kernel()
-def _arrive(row: int, at: int, seeds: Any, growth: Any, azimuth: float, time: float, near: Any, held: Any) -> None:
-    _, held_bits, held_seeds, held_active, held_sweep, held_row, until, marks, _, _, _, waiting = held
+def _arrive(row: int, at: int, seeds: Any, growth: Any, azimuth: float, time: float, box: Any, held: Any) -> None:
+    """Keep a row, and mark what is near between it and the rows that came before."""
+    _, held_bits, held_seeds, held_near, held_sweep, held_row, marks, _, _, _, waiting = held
+    masks, words = box[0], box[1]
     places = held_row.size - 1
     slot = row & places
-    bits, kept, active = held_bits[slot], held_seeds[slot], held_active[slot]
+    bits, kept, near = held_bits[slot], held_seeds[slot], held_near[slot]
+    anything = np.uint64(0)
     for w in range(seeds.size):
         bits[w] = growth[w] | seeds[w]
         kept[w] = seeds[w]
-        active[w] = row <= until[w]
+        near[w] = np.uint64(0)
+        anything |= seeds[w]
     held_row[slot] = row
     held_sweep[slot, 0], held_sweep[slot, 1] = azimuth, time
     waiting[slot] = at
     marks[ARRIVED] = row
-    for w in range(seeds.size):
-        if not seeds[w]:
-            continue
-        for v in range(max(w - 1, 0), min(w + 2, seeds.size)):
-            for back in range(max(row - near[v], until[v] + 1, 0), row + 1):
-                if held_row[back & places] == back:
-                    held_active[back & places, v] = True
-            until[v] = row + near[v]
+    if anything:
+        _spread(kept, masks[0], words[0], near)
+    elif row - marks[SEEDED] >= words.size:
+        return
+    for back in range(1, min(words.size, row + 1)):
+        other = (row - back) & places
+        if held_row[other] == row - back:
+            _spread(held_seeds[other], masks[back], words[back], near)
+            if anything:
+                _spread(kept, masks[back], words[back], held_near[other])
+    if anything:
+        marks[SEEDED] = row
+
+
+@kernel()
+def _spread(seeds: Any, mask: Any, words: int, near: Any) -> None:
+    """Mark the detected cells of a row, and the cells next to them, within the mask."""
+    one, top = np.uint64(1), np.uint64(63)
+    before, here = np.uint64(0), seeds[0] & mask[0]
+    for w in range(words):
+        after = seeds[w + 1] & mask[w + 1] if w + 1 < words else np.uint64(0)
+        near[w] |= (here | here << one | here >> one | before >> top | after << top) & mask[w]
+        before, here = here, after
 
 
 @kernel()
@@ -243,7 +264,7 @@ def _look_to(
     count: int,
 ) -> tuple[int, bool]:
     """Look at the waiting rows up to `last`. Gives the count of plots, and False where there was no room for more."""
-    held_cells, _, held_seeds, held_active, held_sweep, held_row, _, marks, budget, bits, cells, waiting = held
+    held_cells, _, held_seeds, _, held_sweep, held_row, marks, budget, bits, cells, waiting = held
     numbers, turn = pool[3], pool[4]
     geometry = (scale[0], scale[1], scale[2])
     for row in range(marks[PENDING], min(last, marks[ARRIVED]) + 1):
@@ -256,9 +277,9 @@ def _look_to(
         if not _choose(row, slot, box, held):
             continue
         if waiting[slot] >= 0:
-            _copy_words(amplitude[waiting[slot]], held_active[slot], False, cells)
+            _copy_words(amplitude[waiting[slot]], bits, False, cells)
         else:
-            _copy_words(held_cells[slot], held_active[slot], False, cells)
+            _copy_words(held_cells[slot], bits, False, cells)
         grid_row = row % azimuths
         budget[0] = max(budget[0] - count_runs(bits), 0.0)
         count = retire(row, azimuths, rule[2].shape[1] - 1, limits, pool, geometry, out, count)
@@ -271,12 +292,12 @@ def _look_to(
 @kernel()
 def _choose(row: int, slot: int, box: Any, held: Any) -> bool:
     """Write the cells of the row that count to the scratch row; False when there are none."""
-    held_bits, held_seeds, held_active = held[1], held[2], held[3]
-    marks, budget, bits = held[7], held[8], held[9]
+    held_bits, held_seeds, held_near = held[1], held[2], held[3]
+    marks, budget, bits = held[6], held[7], held[8]
     anything = np.uint64(0)
-    grown, kept, active = held_bits[slot], held_seeds[slot], held_active[slot]
+    grown, kept, near = held_bits[slot], held_seeds[slot], held_near[slot]
     for w in range(bits.size):
-        bits[w] = grown[w] if active[w] else np.uint64(0)
+        bits[w] = kept[w] | (grown[w] & near[w])
         anything |= bits[w]
     if not anything:
         return False
@@ -292,8 +313,8 @@ def _choose(row: int, slot: int, box: Any, held: Any) -> bool:
 
 
 @kernel()
-def _copy_words(source: Any, active: Any, all_words: bool, cells: Any) -> None:
-    for w in range(active.size):
-        if all_words or active[w]:
+def _copy_words(source: Any, bits: Any, whole: bool, cells: Any) -> None:
+    for w in range(bits.size):
+        if whole or bits[w]:
             for j in range(64 * w, min(64 * w + 64, cells.size)):
                 cells[j] = source[j]

@@ -21,11 +21,13 @@ def linked_components(cells: NDArray[np.bool_], reach: NDArray[np.int64]) -> lis
     return [frozenset(map(tuple, at[label == one].tolist())) for one in np.unique(label)]
 
 
-def grown_cells(seeds: NDArray[np.bool_], growth: NDArray[np.bool_], rows: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """The detected cells, and the growth that has one in its box: rows[w] rows about, in its word or the two beside."""
+def grown_cells(seeds: NDArray[np.bool_], growth: NDArray[np.bool_], reach: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """The detected cells, and the growth with a detected cell near: in its range cell or the next, not farther in rows
+    than `reach` (as above) links at both cells."""
     kept = seeds.copy()
+    farthest = (reach >= 0).sum(axis=1) - 1
+    row, cell = np.nonzero(seeds)
     for i, j in np.argwhere(growth):
-        w = j // 64
-        box = seeds[max(i - rows[w], 0) : i + rows[w] + 1, max(64 * (w - 1), 0) : 64 * (w + 2)]
-        kept[i, j] |= bool(box.any())
+        near = (abs(cell - j) <= 1) & (abs(row - i) <= np.minimum(farthest[j], farthest[cell]))
+        kept[i, j] |= bool(near.any())
     return kept
