@@ -53,7 +53,8 @@ class Extraction:
     source: ClassVar[str] = "Galati et al., section 4A (eq. 1.2); no figures there"
     reading: ClassVar[str] = (
         "3 m x 0.18 degrees, 4096 azimuths; dense random scatterers over the outlines, any heading; thresholds of the "
-        "hybrid detector with the clutter level known. Split: a second plot has most of its cells on the target, even "
+        "hybrid detector with the clutter level known; no plot is cut before an eighth of a turn. Split: a second plot "
+        "has most of its cells on the target, even "
         "if it is one cell. Merged: the plot with most cells of one target is that of the other. Error: centroid of "
         "the plot with most cells against the middle of the target. NEES/2: error squared over the plot's own "
         "covariance, 1 when honest."
@@ -66,7 +67,7 @@ class Extraction:
 
     def quick(self) -> Self:
         """Fewer trials at fewer ranges."""
-        return replace(self, trials=30, ranges_m=(200.0, 700.0, 1000.0, 1500.0))
+        return replace(self, trials=16, ranges_m=(200.0, 700.0, 1000.0, 1500.0))
 
     def trial(self, chance: np.random.Generator, number: int, clock: Callable[[], float]) -> Trial:
         """`found`: (extractors, strengths, scenes, ranges, 5); the scenes are those ALONE, then PAIRS."""
@@ -107,11 +108,12 @@ class Extraction:
 
     def _rates(self, found: Floats, what: str, wanted: bool) -> list[Row]:
         made = []
-        for band, (_, _, where) in enumerate(BANDS):
+        bands = [(band, one[2]) for band, one in enumerate(BANDS) if self._in_band(band).any()]
+        for band, where in bands:
             bound = (5.0, 15.0, None, None)[band] if wanted else None
             made += [self._rate(found, k, band, SPLIT, f"{_name(k)} split {where}, {what}", bound) for k in range(4)]
         for k in range(len(ALONE), len(ALONE) + len(PAIRS)):
-            for band, (_, _, where) in enumerate(BANDS):
+            for band, where in bands:
                 bound = 2.0 if wanted and band < 3 and "15 m" in _name(k) else None
                 made.append(self._rate(found, k, band, MERGED, f"{_name(k)} merged {where}, {what}", bound))
         for k in range(4):
@@ -212,7 +214,12 @@ def _targets(chance: np.random.Generator, scene: int, range_m: float) -> list[Po
 
 @lru_cache(maxsize=8)
 def _part(name: str) -> Any:
-    return parts.build("extract", name, {"max_open_runs": 4096})
+    return parts.build("extract", name, {"max_open_runs": 4096, "max_extent_turn": 0.125})
+
+
+@lru_cache(maxsize=8)
+def _offset_db(pfa: float) -> float:
+    return threshold_offset_db(pfa, VideoFormat().db_per_step)
 
 
 def _detections(look: Closeup, pfa: float, growth_db: float | None) -> Detections:
@@ -225,7 +232,7 @@ def _detections(look: Closeup, pfa: float, growth_db: float | None) -> Detection
         padded[:, : cells.shape[1]] = cells
         return np.packbits(padded, axis=1, bitorder="little").view(np.uint64)
 
-    return Detections(above(threshold_offset_db(pfa, step)), growth=None if growth_db is None else above(growth_db))
+    return Detections(above(_offset_db(pfa)), growth=None if growth_db is None else above(growth_db))
 
 
 def _extract(look: Closeup, part: Extractor, pfa: float, amplitude: NDArray[np.uint8]) -> tuple[Detections, Plots]:

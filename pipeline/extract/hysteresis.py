@@ -27,16 +27,16 @@ class Hysteresis:
     clutter.
 
     most_rows: greatest height of the window in azimuth cells (it holds at a few tens of metres). min_cells: plots of
-    fewer cells are left out, counted. max_extent_turn: a plot is cut when it is as long as this part of a turn,
-    counted. max_open_runs: bound on the runs of cells in open plots; more are left out, counted. max_grown_runs: bound
-    on the runs of a turn; a row over it keeps its detected cells only, counted.
+    fewer cells are left out, counted. max_extent_turn: a plot is cut when it is as long as this part of a turn (an
+    eighth is 78 m at 100 m), counted. max_open_runs: bound on the runs of cells in open plots; more are left out,
+    counted. max_grown_runs: bound on the runs of a turn; a row over it keeps its detected cells only, counted.
     """
 
     growth_db: float = 7.0
     window_m: float = 3.0
     most_rows: int = 32
     min_cells: int = 1
-    max_extent_turn: float = 0.05
+    max_extent_turn: float = 0.125
     max_open_runs: int = 32_768
     max_grown_runs: int = 60_000
 
