@@ -274,6 +274,8 @@ def test_the_parts_of_a_radar_are_changed_with_the_keyboard_alone(screen: Screen
     def running() -> Any:
         return serving.service.front_end("smr-1").running["detect"]["name"]
 
+    for name in ("hybrid", "adaptive"):  # compiled before it is waited for
+        serving.service.choose_parts("smr-1", {"detect": {"name": name}})
     assert running() == "adaptive"
     page.locator("#parts-open summary").wait_for()
     page.locator("#parts-open summary").focus()

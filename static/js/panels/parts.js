@@ -106,7 +106,7 @@ export class PartsPanel {
     keyed(part('.parts-picks'), Object.keys(state.running), String, (verb) => this.pick(radar, verb, state), (row, verb) => {
       const select = /** @type {HTMLSelectElement} */ (row.querySelector('select'));
       const name = wanted.get(verb) ?? (state.next ?? state.running)[verb].name;
-      if (select.value !== name && document.activeElement !== select) select.value = name;
+      if (select.value !== name) select.value = name;
       select.setAttribute('aria-disabled', String(this.busy.has(radar)));
       row.classList.toggle('is-changed', name !== state.running[verb].name);
       row.title = state.available[verb].find((one) => one.name === name)?.about ?? '';
@@ -143,13 +143,14 @@ export class PartsPanel {
   /** @param {string} radar */
   forget(radar) {
     this.wanted.delete(radar);
-    const card = this.list.querySelector(`[data-key="${CSS.escape(radar)}"]`);
-    if (card instanceof HTMLElement) {
-      // from the button, which goes, to the first choice; a choice that has the focus is not changed under the hand
-      /** @type {HTMLElement} */ (document.activeElement)?.blur();
-      this.fill(card, radar);
-      card.querySelector('select')?.focus();
-    }
+    this.focus(radar);
+    this.update(performance.now());
+  }
+
+  /** From a button that goes to what stays. @param {string} radar */
+  focus(radar) {
+    const select = this.list.querySelector(`[data-key="${CSS.escape(radar)}"] select`);
+    if (select instanceof HTMLElement) select.focus();
   }
 
   /** @param {string} radar */
@@ -157,7 +158,7 @@ export class PartsPanel {
     const state = this.states.get(radar);
     if (!state) return;
     const order = orderOf(state, this.wanted.get(radar) ?? new Map());
-    this.list.querySelector('select')?.focus();
+    this.focus(radar);
     this.busy.add(radar);
     this.update(performance.now());
     try {
