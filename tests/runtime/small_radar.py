@@ -14,6 +14,7 @@ from pipeline.sites import RadarSite
 from pipeline.tables import Sweeps, VideoFormat
 
 AZIMUTHS, RANGES, BLOCKS = 96, 128, 8
+T0 = 1.7e9
 VIDEO = VideoFormat(azimuths=AZIMUTHS, ranges=RANGES, range_step_m=3.0, period_s=1.0)
 
 
@@ -36,5 +37,5 @@ def turn(scan: int, storm: bool = False) -> Iterator[Sweeps]:
     for rows in np.split(np.arange(AZIMUTHS, dtype=np.int32), BLOCKS):
         azimuth = (rows + 0.5) * VIDEO.azimuth_step_rad
         yield Sweeps(
-            0, scan, rows, azimuth, 1000.0 + scan + rows / AZIMUTHS, amplitude[rows], last=rows[-1] + 1 == AZIMUTHS
+            0, scan, rows, azimuth, T0 + scan + rows / AZIMUTHS, amplitude[rows], last=rows[-1] + 1 == AZIMUTHS
         )
