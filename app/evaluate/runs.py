@@ -5,8 +5,10 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import signal
+import threading
 import time
 import traceback
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
@@ -78,9 +80,7 @@ def carry_out(
     try:
         with _workers(backend, jobs, experiment.trials):
             tasks = (joblib.delayed(one_trial)(experiment, seed, number) for number in range(experiment.trials))
-            with _interrupts_held():
-                finished = joblib.Parallel(return_as="generator_unordered")(tasks)
-            for number, result in finished:
+            for number, result in _as_finished(tasks):
                 found[number] = result
                 done(len(found))
     except TrialError as error:
@@ -142,6 +142,31 @@ def _workers(backend: Backend, jobs: int, trials: int) -> Iterator[None]:
     else:
         with joblib.parallel_config("threading", n_jobs=jobs):
             yield
+
+
+def _as_finished(tasks: Iterator[Any]) -> Iterator[tuple[int, Trial]]:
+    """What the trials gave, as they end. On the way out, whatever the reason, nobody goes on working."""
+    finished = None
+    try:
+        with _interrupts_held():
+            finished = joblib.Parallel(return_as="generator_unordered")(tasks)
+        yield from finished
+    except BaseException:
+        if finished is not None:
+            with _quietly():
+                finished.close()
+        raise
+
+
+@contextlib.contextmanager
+def _quietly() -> Iterator[None]:
+    """joblib would warn of trials given up, and its pool's thread may stumble over them."""
+    before, threading.excepthook = threading.excepthook, lambda _: None
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            yield
+    finally:
+        threading.excepthook = before
 
 
 @contextlib.contextmanager
