@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.contract import Refused
+from pipeline.assemble.bit_depth import to_octets
 from pipeline.sites import RadarSite
 from pipeline.tables import Sweeps, VideoFormat
 
@@ -76,7 +77,7 @@ def stretch_table(path: Path, bits: int | None, turn: NDArray[np.uint8]) -> tupl
     if not 1 <= used <= 8:
         raise RecordingError(f"{path}: bits must be 1 to 8, not {used}")
     top = (1 << used) - 1
-    return used, (np.minimum(np.arange(256), top) * 255 // top).astype(np.uint8)
+    return used, to_octets(np.minimum(np.arange(256), top).astype(np.uint8), used)
 
 
 def video_format(path: Path, shape: tuple[int, int], period: float, words: Mapping[str, Any]) -> VideoFormat:
