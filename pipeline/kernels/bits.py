@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import extending, njit, types
+from numba.core import cgutils
 
 _BYTES = ir.VectorType(ir.IntType(8), 64)
 intrinsic: Any = extending.intrinsic
@@ -142,6 +143,33 @@ def bits_of_row(cells: Any, limits_at: int, bits: Any, tail: Any) -> Any:
         bits[whole] = word
         anything |= word
     return anything != np.uint64(0)
+
+
+@intrinsic
+def filled_words(typing: Any, words: Any) -> Any:
+    """Bit w is set when word w of the 8 at address `words` has any bit set."""
+
+    def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        kind = ir.VectorType(ir.IntType(64), 8)
+        filled = builder.icmp_unsigned("!=", _load(builder, given[0], kind), ir.Constant(kind, [0] * 8))
+        return builder.zext(builder.bitcast(filled, ir.IntType(8)), ir.IntType(64))
+
+    return types.uint64(types.uintp), build
+
+
+@intrinsic
+def fetch_ahead(typing: Any, address: Any) -> Any:
+    """Ask for the cache line at an address that will be read soon; an address that cannot be read does no harm."""
+
+    def build(context: Any, builder: Any, signature: Any, words: Any) -> Any:
+        pointer, number = ir.IntType(8).as_pointer(), ir.IntType(32)
+        kind = ir.FunctionType(ir.VoidType(), [pointer, number, number, number])
+        fetch = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")
+        read, keep, data = (ir.Constant(number, one) for one in (0, 3, 1))
+        builder.call(fetch, [builder.inttoptr(words[0], pointer), read, keep, data])
+        return context.get_dummy_value()
+
+    return types.void(types.uintp), build
 
 
 @njit(nogil=True, cache=True)

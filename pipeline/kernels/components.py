@@ -19,12 +19,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.kernels.bits import borrowed
+from pipeline.kernels.bits import fetch_ahead, filled_words, trailing_zeros
 from pipeline.kernels.compiled import inlined, kernel
 from pipeline.kernels.links import LinkRule
 from pipeline.kernels.plot_shape import (
     AZIMUTH,
     BEARING_CELLS,
+    BEFORE,
     COSINE,
     GIVEN,
     SCAN,
@@ -44,6 +45,9 @@ from pipeline.tables import Detections, Plots, Sweeps
 NEWEST, LATEST, RETIRED, HEAD, TAIL, DROPPED, CUT, SMALL, SEEDLESS, CELLS, TAKEN, NUMBERS = range(12)
 """Places in `ComponentState.numbers`: newest row, newest row with runs, row up to which all are retired, first free
 place and oldest open run of the pool, and counts; TAKEN: steps of the present block that are done."""
+
+AHEAD = 8
+"""Rows between asking for cells and reading them."""
 
 MOVE = 512
 """Delivered runs at the beginning of the pool that are worth moving the others down for."""
@@ -148,6 +152,8 @@ def take_block(sweeps: Sweeps, detections: Detections, state: ComponentState) ->
         read_only(sweeps.azimuth),
         read_only(sweeps.time),
     )
+    if not len(sweeps):
+        return Plots.empty()
     state.radar[0] = sweeps.radar
     state.numbers[TAKEN] = 0
     first_row = sweeps.scan * state.azimuths
@@ -175,38 +181,50 @@ def flush(state: ComponentState) -> Plots:
 def _take_rows(
     block: Any, first_row: int, azimuths: int, rule: Any, limits: Any, pool: Any, scale: Any, out: Any
 ) -> Any:
-    mask, amplitude = borrowed(block[0]), borrowed(block[1])
-    rows, azimuth, times = borrowed(block[2]), borrowed(block[3]), borrowed(block[4])
-    rule = (borrowed(rule[0]), borrowed(rule[1]), borrowed(rule[2]))
-    pool = (borrowed(pool[0]), borrowed(pool[1]), borrowed(pool[2]), borrowed(pool[3]), borrowed(pool[4]))
-    scale = (scale[0], borrowed(scale[1]), borrowed(scale[2]), borrowed(scale[3]))
-    out = (borrowed(out[0]), borrowed(out[1]), borrowed(out[2]), borrowed(out[3]), borrowed(out[4]), borrowed(out[5]))
+    mask, amplitude, rows, azimuth, times = block
     numbers = pool[3]
     reach_rows = rule[2].shape[1] - 1
     geometry = (scale[0], scale[1], scale[2])
-    room = out[0].shape[1]
     count = 0
     done = numbers[TAKEN]
-    while done < rows.size:
-        bits = mask[done]
-        anything = np.uint64(0)
-        for w in range(bits.size):
-            anything |= bits[w]
-        if anything:
-            if count + open_runs(numbers) > room:
-                break
-            row, grid_row = first_row + rows[done], rows[done]
-            count = retire(row, azimuths, reach_rows, limits, pool, geometry, out, count)
+    for soon in range(done, min(done + AHEAD, rows.size)):
+        _fetch_row(mask[soon], amplitude, soon)
+    while done <= rows.size:
+        at_end = done == rows.size
+        bits = mask[done - at_end]
+        if not at_end:
+            if done + AHEAD < rows.size:
+                _fetch_row(mask[done + AHEAD], amplitude, done + AHEAD)
+            anything = np.uint64(0)
+            for w in range(bits.size):
+                anything |= bits[w]
+            if not anything:
+                done += 1
+                continue
+        if count + open_runs(numbers) > out[0].shape[1]:
+            break
+        grid_row = rows[done - at_end]
+        row = first_row + grid_row
+        count = retire(row, azimuths, reach_rows, limits, pool, geometry, out, count)
+        if at_end:
+            numbers[NEWEST] = row
+        else:
             note_row(row, grid_row, azimuth[done], times[done], scale[0], pool[4])
             take_row(row, grid_row, azimuths, bits, bits, False, amplitude[done], rule, limits, pool, scale)
         done += 1
-    if done == rows.size and count + open_runs(numbers) <= room:
-        row = first_row + rows[done - 1]
-        count = retire(row, azimuths, reach_rows, limits, pool, geometry, out, count)
-        numbers[NEWEST] = row
-        done += 1
     numbers[TAKEN] = done
     return count
+
+
+@inlined()
+def _fetch_row(bits: Any, amplitude: Any, at: int) -> None:
+    """Ask for the cells under a row's bits: waiting for them costs more than all the rest."""
+    cells = amplitude.ctypes.data + np.uintp(at) * np.uintp(amplitude.shape[1])
+    for block in range(0, bits.size - 7, 8):
+        filled = filled_words(bits.ctypes.data + np.uintp(8 * block))
+        while filled:
+            fetch_ahead(cells + np.uintp(64 * block) + np.uintp(64) * np.uintp(trailing_zeros(filled)))
+            filled &= filled - np.uint64(1)
 
 
 @inlined()
@@ -215,7 +233,7 @@ def open_runs(numbers: Any) -> Any:
     return numbers[HEAD] - numbers[TAIL]
 
 
-@kernel()
+@inlined()
 def note_row(row: int, grid_row: int, azimuth: float, time: float, constants: Any, turn: Any) -> None:
     """Remember when and where a row with runs was swept."""
     here = turn[grid_row]
@@ -223,11 +241,12 @@ def note_row(row: int, grid_row: int, azimuth: float, time: float, constants: An
         here[GIVEN] = azimuth
         here[SINE], here[COSINE] = np.sin(azimuth), np.cos(azimuth)
         here[AZIMUTH] = azimuth % (2 * np.pi)
+        here[BEFORE] = 0.5 - here[AZIMUTH] / constants[4]
     here[TIME] = time
-    here[SCAN] = np.rint((row + 0.5 - here[AZIMUTH] / constants[4]) / constants[6])
+    here[SCAN] = np.rint((row + here[BEFORE]) * (1.0 / constants[6]))
 
 
-@kernel()
+@inlined()
 def take_row(
     row: int,
     grid_row: int,
@@ -247,7 +266,7 @@ def take_row(
         _move_down(runs, window, numbers)
     first = numbers[HEAD]
     room = limits[2] - (first - numbers[TAIL])
-    head, dropped = find_runs(bits, seeds, grown, cells, grid_row, rule, (scale[3], scale[1]), runs, first, room)
+    head, dropped = find_runs(bits, seeds, grown, cells, grid_row, rule, scale, runs, first, room)
     numbers[DROPPED] += dropped
     if head == first:
         return
@@ -261,7 +280,7 @@ def take_row(
     _link_rows(row, grid_row, azimuths, first, head, limits[1], rule[2], pool)
 
 
-@kernel()
+@inlined()
 def _link_rows(
     row: int, grid_row: int, azimuths: int, first: int, head: int, most_rows: int, reach: Any, pool: Any
 ) -> None:
@@ -290,8 +309,11 @@ def _link_rows(
                 if gap > 0 and gap > reach[runs[q].ring, back]:
                     break
                 other = find(runs, np.int64(q))
-                if other != mine and (grid_row - np.int64(runs[other].row)) % azimuths < most_rows:
-                    mine = unite(runs, mine, other, grid_row)
+                if other != mine:
+                    rows = grid_row - np.int64(runs[other].row)
+                    rows += 0 if rows >= 0 else azimuths
+                    if rows < most_rows:
+                        mine = unite(runs, mine, other, grid_row)
 
 
 @kernel()
@@ -309,7 +331,7 @@ def _move_down(runs: Any, window: Any, numbers: Any) -> None:
     numbers[HEAD] = head - by
 
 
-@kernel()
+@inlined()
 def retire(
     row: int, azimuths: int, reach_rows: int, limits: Any, pool: Any, geometry: Any, out: Any, count: int
 ) -> Any:
@@ -332,22 +354,25 @@ def retire(
             one = runs[run]
             if one.parent == FREE:
                 continue
-            root = find(runs, np.int64(run))
-            if runs[root].last != one.row:
-                continue
+            alone = one.next == run
             total, seeds = np.int64(one.end) - np.int64(one.start), np.int64(one.seeds)
-            if one.next != run:
+            root = np.int64(run)
+            if not alone:
+                root = find(runs, root)
+                if runs[root].last != one.row:
+                    continue
                 total, seeds = _sizes(root, runs)
             numbers[CELLS] += total
             if total < limits[0] or seeds == 0:
                 numbers[SMALL if seeds else SEEDLESS] += 1
                 _free(root, runs)
                 continue
-            if one.next == run and total < axis_cells:
+            if alone and total < axis_cells:
                 measure_run(one, turn, (constants, ground, sums), out, count)
                 one.parent = FREE
             else:
-                rows = (np.int64(one.row) - np.int64(runs[root].row)) % azimuths + 1
+                rows = np.int64(one.row) - np.int64(runs[root].row)
+                rows += 1 if rows >= 0 else azimuths + 1
                 numbers[CUT] += rows >= limits[1]
                 measure_plot(root, old, runs, turn, (constants, ground, sums), out, count)
             count += 1

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.kernels.compiled import inlined, kernel
+from pipeline.kernels.compiled import inlined
 from pipeline.kernels.runs import FREE
 from pipeline.sites import RadarSite
 from pipeline.tables import Plots
@@ -29,9 +29,9 @@ BEARING_LIMIT = 0.35
 BEARING_CELLS = 8.0
 """Independent cells below which there is no axis."""
 
-SINE, COSINE, TIME, AZIMUTH, SCAN, GIVEN, TURN_FIELDS = 0, 1, 2, 3, 4, 5, 8
-"""What is known of a row of the grid that had runs: of its azimuth (0 .. 2 pi), s, rad, turn it belongs to, and the
-azimuth as it was given."""
+SINE, COSINE, TIME, AZIMUTH, SCAN, GIVEN, BEFORE, TURN_FIELDS = 0, 1, 2, 3, 4, 5, 6, 8
+"""What is known of a row of the grid that had runs: of its azimuth (0 .. 2 pi), s, rad, turn it belongs to, the azimuth
+as it was given, and what is added to an absolute row to know the turn."""
 
 WIDE = ("time", "east", "north", "range", "azimuth", "weighted_east", "weighted_north", "scan")
 NARROW = (
@@ -181,7 +181,7 @@ def measure_run(one: Any, turn: Any, geometry: Any, out: Any, at: int) -> None:
     window[at, 3] = total
 
 
-@kernel()
+@inlined()
 def measure_plot(root: int, newest: int, runs: Any, turn: Any, geometry: Any, out: Any, at: int) -> None:
     """Fill row `at` of the output from a component.
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.kernels.bits import set_bits, trailing_zeros
+from pipeline.kernels.bits import filled_words, set_bits, trailing_zeros
 from pipeline.kernels.compiled import inlined, kernel
 
 RUN = np.dtype(
@@ -100,7 +100,50 @@ def count_set(bits: Any, start: int, end: int) -> Any:
     return found
 
 
-@kernel()
+@inlined()
+def edges_of(bits: Any, edges: Any) -> int:
+    """Write where the runs of one row of words begin and end (first, one past the last, and so on); gives how many
+    numbers."""
+    one, top = np.uint64(1), np.uint64(63)
+    many, after = 0, 0
+    carry = np.uint64(0)
+    for block in range(0, bits.size, 8):
+        filled = np.uint64(0)
+        if block + 8 <= bits.size:
+            filled = filled_words(bits.ctypes.data + np.uintp(8 * block))
+        else:
+            for w in range(bits.size - block):
+                filled |= np.uint64(bits[block + w] != 0) << np.uint64(w)
+        while filled:
+            w = block + np.int64(trailing_zeros(filled))
+            filled &= filled - one
+            if many & 1 and w != after:  # a run to the end of a word, and nothing in the next
+                edges[many] = 64 * after
+                many += 1
+                carry = np.uint64(0)
+            word = bits[w]
+            turns = word ^ ((word << one) | carry)
+            carry = word >> top
+            after = w + 1
+            if not turns:
+                continue
+            # most words hold one run: its two ends are written without asking whether there are two
+            edges[many] = 64 * w + np.int64(trailing_zeros(turns))
+            turns &= turns - one
+            edges[many + 1] = 64 * w + np.int64(trailing_zeros(turns))
+            many += 2 if turns else 1
+            turns &= turns - one
+            while turns:
+                edges[many] = 64 * w + np.int64(trailing_zeros(turns))
+                many += 1
+                turns &= turns - one
+    if many & 1:
+        edges[many] = 64 * after
+        many += 1
+    return many
+
+
+@inlined()
 def find_runs(
     bits: Any, seeds: Any, grown: bool, cells: Any, row: int, rule: Any, scale: Any, runs: Any, head: int, room: int
 ) -> tuple[int, int]:
@@ -108,52 +151,41 @@ def find_runs(
     there was no room for.
 
     bits, seeds: (words) cells of plots, and those of them that the detector found (the same unless `grown`). row: in
-    the azimuth grid. rule: (ring_of_cell, ring_stop, reach) of a LinkRule. scale: (loudness, ground) of a Geometry.
+    the azimuth grid. rule: (ring_of_cell, ring_stop, reach, edges) of a LinkRule. scale: (constants, ground, sums,
+    loudness) of a Geometry.
     """
-    ring_of_cell, ring_stop, reach = rule
-    loudness, ground = scale
-    one, top = np.uint64(1), np.uint64(63)
+    ring_of_cell, ring_stop, reach, edges = rule
+    ground, loudness = scale[1], scale[3]
     first, stop = head, head + room
-    ranges = cells.size
     dropped = 0
-    begun = np.int64(-1)
-    carry = np.uint64(0)
-    for w in range(bits.size + 1):
-        word = bits[w] if w < bits.size else np.uint64(0)
-        turns = word ^ ((word << one) | carry)
-        carry = word >> top
-        while turns:
-            at = min(64 * w + np.int64(trailing_zeros(turns)), ranges)
-            turns &= turns - one
-            if begun < 0:
-                begun = at
+    for k in range(0, edges_of(bits, edges), 2):
+        begin, until = edges[k], min(edges[k + 1], cells.size)
+        while begin < until:
+            ring = ring_of_cell[begin]
+            end = min(until, ring_stop[ring])
+            if head == stop:
+                dropped += 1
+                begin = end
                 continue
-            while begun < at:
-                ring = ring_of_cell[begun]
-                end = min(at, ring_stop[ring])
-                if head == stop:
-                    dropped += 1
-                    begun = end
-                    continue
-                total, peak = np.int64(0), np.int64(0)
-                weight, moment = 0.0, 0.0
-                for j in range(begun, end):
-                    value = np.int64(cells[j])
-                    total += value
-                    peak = max(peak, value)
-                    loud = loudness[value]
-                    weight += loud
-                    moment += loud * ground[j]
-                run = runs[head]
-                run.weight, run.moment = weight, moment
-                run.start, run.end, run.ring, run.row = begun, end, ring, row
-                run.parent, run.next, run.last = head, head, row
-                run.seeds = count_set(seeds, begun, end) if grown else end - begun
-                run.total, run.peak = total, peak
-                # the neighbour in the row is enough: the reach falls with range, so what links over a run links to it
-                if head > first and begun - (runs[head - 1].end - 1) <= reach[ring, 0]:
-                    unite(runs, find(runs, head - 1), head, row)
-                head += 1
-                begun = end
-            begun = np.int64(-1)
+            total = peak = np.int64(cells[begin])
+            weight = loudness[total]
+            moment = weight * ground[begin]
+            for j in range(begin + 1, end):
+                value = np.int64(cells[j])
+                total += value
+                peak = max(peak, value)
+                loud = loudness[value]
+                weight += loud
+                moment += loud * ground[j]
+            run = runs[head]
+            run.weight, run.moment = weight, moment
+            run.start, run.end, run.ring, run.row = begin, end, ring, row
+            run.parent, run.next, run.last = head, head, row
+            run.seeds = count_set(seeds, begin, end) if grown else end - begin
+            run.total, run.peak = total, peak
+            # the neighbour in the row is enough: the reach falls with range, so what links over a run links to it
+            if head > first and begin - (np.int64(runs[head - 1].end) - 1) <= reach[ring, 0]:
+                unite(runs, find(runs, head - 1), head, row)
+            head += 1
+            begin = end
     return head, dropped
