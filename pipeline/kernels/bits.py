@@ -164,7 +164,8 @@ def fetch_ahead(typing: Any, address: Any) -> Any:
     def build(context: Any, builder: Any, signature: Any, words: Any) -> Any:
         pointer, number = ir.IntType(8).as_pointer(), ir.IntType(32)
         kind = ir.FunctionType(ir.VoidType(), [pointer, number, number, number])
-        fetch = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")
+        insert: Any = cgutils.get_or_insert_function
+        fetch = insert(builder.module, kind, "llvm.prefetch.p0i8")
         read, keep, data = (ir.Constant(number, one) for one in (0, 3, 1))
         builder.call(fetch, [builder.inttoptr(words[0], pointer), read, keep, data])
         return context.get_dummy_value()

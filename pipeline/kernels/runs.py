@@ -101,21 +101,21 @@ def count_set(bits: Any, start: int, end: int) -> Any:
 
 
 @inlined()
-def edges_of(bits: Any, edges: Any) -> int:
+def edges_of(bits: Any, edges: Any) -> Any:
     """Write where the runs of one row of words begin and end (first, one past the last, and so on); gives how many
     numbers."""
     one, top = np.uint64(1), np.uint64(63)
-    many, after = 0, 0
+    many, after = np.int64(0), np.int64(0)
     carry = np.uint64(0)
     for block in range(0, bits.size, 8):
         filled = np.uint64(0)
         if block + 8 <= bits.size:
             filled = filled_words(bits.ctypes.data + np.uintp(8 * block))
         else:
-            for w in range(bits.size - block):
-                filled |= np.uint64(bits[block + w] != 0) << np.uint64(w)
+            for rest in range(bits.size - block):
+                filled |= np.uint64(bits[block + rest] != 0) << np.uint64(rest)
         while filled:
-            w = block + np.int64(trailing_zeros(filled))
+            w: Any = block + np.int64(trailing_zeros(filled))
             filled &= filled - one
             if many & 1 and w != after:  # a run to the end of a word, and nothing in the next
                 edges[many] = 64 * after
