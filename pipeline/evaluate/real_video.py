@@ -29,11 +29,11 @@ SEEN_TURNS = 3
 
 @dataclass(frozen=True)
 class RealVideo:
-    """Every detector, and one extractor, over a recording that is played again and again for `turns` turns.
+    """Every detector with every extractor over a recording that is played again and again for `turns` turns.
 
-    video: the recording. detectors: one a trial. extractor: name of the part. pfa: nominal. least_cells: of the plots
-    whose steadiness is told, and of fixed things. near_m: how near a plot must be found again. turns: of which 20
-    learn.
+    video: the recording. detectors, extractors (names of parts): a pair of them is a trial. pfa: nominal. least_cells:
+    of the plots whose steadiness is told, and of fixed things. near_m: how near a plot must be found again. turns: of
+    which 20 learn.
     """
 
     title: str = "A real radar's video: plots a scan and how steady they are"
@@ -45,10 +45,10 @@ class RealVideo:
         " has a plot within 15 m in the next turn. Fixed thing: 4 or more adjacent cells, each above three quarters of"
         " full scale in nine of ten turns; seen in a turn when any of its cells is detected"
     )
-    trials: int = field(default_factory=lambda: len(every_part()))
+    trials: int = field(default_factory=lambda: 2 * len(every_part()))
     video: RecordedVideo | None = None
     detectors: tuple[Case, ...] = field(default_factory=every_part)
-    extractor: str = "manhattan"
+    extractors: tuple[str, ...] = ("manhattan", "hysteresis")
     pfa: float = 1e-6
     least_cells: int = 4
     near_m: float = 15.0
@@ -63,14 +63,16 @@ class RealVideo:
         return self
 
     def trial(self, chance: np.random.Generator, number: int, clock: Callable[[], float]) -> Trial:
-        """Of detector `number`: plots (n, 4) turn, east, north, cells; degraded (turns); seen (fixed things, 2) after
+        """Of one pair: plots (n, 4) turn, east, north, cells; degraded (turns); seen (fixed things, 2) after
         learning and 15 turns later. Raises ValueError without a recording, or for one that cannot be used."""
         video = self._usable()
         octets = to_octets(video.scans, video.bits)
         site = RadarSite("recording", 0.0, 0.0, 0.0, video_format(video))
-        detector = self.detectors[number % len(self.detectors)].detector(self.pfa)
-        extractor = build("extract", self.extractor)
-        detecting, extracting = detector.start(site.video), extractor.start(site)
+        pairs = self._pairs()
+        case, method = pairs[number % len(pairs)]
+        detector, extractor = case.detector(self.pfa), build("extract", method)
+        detecting = detector.start(site.video, growth_db=getattr(extractor, "growth_db", None))
+        extracting = extractor.start(site)
         plots, degraded = [], np.zeros(self.turns, bool)
         things, many = fixed_things(octets, self.least_cells)
         seen = np.zeros((many + 1, 2), bool)
@@ -89,17 +91,21 @@ class RealVideo:
     def rows(self, results: Sequence[Trial]) -> tuple[Row, ...]:
         """Plots a turn, their steadiness, fixed things kept, degraded turns: of each detector."""
         rows: list[Row] = []
-        for case, result in zip(self.detectors, results, strict=False):
+        judged = range(LEARN_TURNS, self.turns)
+        for (case, method), result in zip(self._pairs(), results, strict=False):
             plots = result["plots"]
-            judged = range(LEARN_TURNS, self.turns)
+            name = f"{case.label}, {method}"
             counts = np.array([(plots[:, 0] == turn).sum() for turn in judged])
-            rows.append(_counted(f"{case.label}: plots a turn", counts))
+            rows.append(_counted(f"{name}: plots a turn", counts))
             large = plots[plots[:, 3] >= self.least_cells]
             counts = np.array([(large[:, 0] == turn).sum() for turn in judged])
-            rows.append(_counted(f"{case.label}: plots of {self.least_cells} cells or more a turn", counts))
+            rows.append(_counted(f"{name}: plots of {self.least_cells} cells or more a turn", counts))
             again, tries = self._again(plots, large)
-            rows.append(_share(f"{case.label}: of these, found again within {self.near_m:g} m in the next turn",
-                               again, tries))  # fmt: skip
+            rows.append(
+                _share(f"{name}: of these, found again within {self.near_m:g} m in the next turn", again, tries)
+            )
+            if method != self.extractors[0]:
+                continue
             seen = result["seen"]
             first = int(seen[:, 0].sum())
             rows.append(_share(f"{case.label}: fixed things of the recording seen", first, len(seen)))
@@ -115,12 +121,12 @@ class RealVideo:
         lines, pictures = [], []
         video = self._usable()
         reach = video.first_range_m + video.range_step_m * video.scans.shape[2]
-        for case, result in zip(self.detectors, results, strict=False):
-            plots = result["plots"]
+        for (case, method), result in zip(self._pairs(), results, strict=False):
+            plots, name = result["plots"], f"{case.label}, {method}"
             counts = np.bincount(plots[:, 0].astype(int), minlength=self.turns)
-            lines.append(Line(case.label, turns, counts[: self.turns].astype(np.float64)))
+            lines.append(Line(name, turns, counts[: self.turns].astype(np.float64)))
             marks = plots[(plots[:, 0] == self.turns - 2) & (plots[:, 3] >= self.least_cells), 1:3]
-            pictures.append((case.label, marks))
+            pictures.append((name, marks))
         picture = results[0]["picture"]
         made = [Figure("Plots a turn", "turn", "plots", tuple(lines), log_y=True)]
         for name, marks in pictures:
@@ -129,6 +135,9 @@ class RealVideo:
             made.append(Figure(f"{name}: plots of {self.least_cells} cells or more", "east, m", "north, m",
                                pictures=(drawn,)))  # fmt: skip
         return tuple(made)
+
+    def _pairs(self) -> list[tuple[Case, str]]:
+        return [(case, method) for method in self.extractors for case in self.detectors]
 
     def _usable(self) -> RecordedVideo:
         if self.video is None:
@@ -195,11 +204,11 @@ def _columns(plots: Any) -> NDArray[np.float64]:
 
 
 def _picture(octets: NDArray[np.uint8], side: int = 400) -> NDArray[np.float32]:
-    """(side, side) mean of the turns, north up."""
+    """(side, side) mean of the turns, from south to north."""
     mean = octets.mean(axis=0, dtype=np.float32)
     azimuths, ranges = mean.shape
     axis = (np.arange(side) + 0.5) / side * 2 - 1
-    east, north = np.meshgrid(axis, -axis)
+    east, north = np.meshgrid(axis, axis)
     row = (np.mod(np.arctan2(east, north), 2 * pi) / (2 * pi) * azimuths).astype(int) % azimuths
     cell = (np.hypot(east, north) * ranges).astype(int)
     return np.where(cell < ranges, mean[row, np.minimum(cell, ranges - 1)], np.float32(0))

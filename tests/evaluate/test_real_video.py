@@ -29,7 +29,8 @@ def recording(bits: int, azimuths: int = 90, ranges: int = 130, turns: int = 6) 
 
 def rows_of(experiment: RealVideo) -> dict[str, float]:
     results = [
-        experiment.trial(np.random.default_rng(k), k, time.perf_counter) for k in range(len(experiment.detectors))
+        experiment.trial(np.random.default_rng(k), k, time.perf_counter)
+        for k in range(len(experiment.detectors) * len(experiment.extractors))
     ]
     assert all(one.lines or one.pictures for one in experiment.figures(results))
     return {row.name: row.measured for row in experiment.rows(results)}
@@ -41,11 +42,12 @@ def test_every_detector_sees_what_stands_still_and_makes_no_flood() -> None:
         # what stood there from the first turn on is clutter to a map of single cells
         seen = 0.0 if case.part == "clutter_map" else 100.0
         assert rows[f"{case.label}: fixed things of the recording seen"] == seen, case.label
-        assert rows[f"{case.label}: plots a turn"] < 8
+        for extractor in ("manhattan", "hysteresis"):
+            assert rows[f"{case.label}, {extractor}: plots a turn"] < 8
         assert rows[f"{case.label}: degraded turns of 20"] == 0
     for label in ("hybrid", "adaptive"):
         assert rows[f"{label}: of these, still seen after 15 turns"] == 100.0
-        assert rows[f"{label}: of these, found again within 15 m in the next turn"] > 95.0
+        assert rows[f"{label}, manhattan: of these, found again within 15 m in the next turn"] > 95.0
 
 
 @pytest.mark.parametrize(("bits", "azimuths", "ranges"), [(1, 64, 130), (4, 100, 129), (6, 90, 1000), (12, 720, 140),
