@@ -188,13 +188,13 @@ def _take_rows(
     count = 0
     done = numbers[TAKEN]
     for soon in range(done, min(done + AHEAD, rows.size)):
-        _fetch_row(mask[soon], amplitude, soon)
+        fetch_row(mask[soon], amplitude, soon)
     while done <= rows.size:
         at_end = done == rows.size
         bits = mask[done - at_end]
         if not at_end:
             if done + AHEAD < rows.size:
-                _fetch_row(mask[done + AHEAD], amplitude, done + AHEAD)
+                fetch_row(mask[done + AHEAD], amplitude, done + AHEAD)
             anything = np.uint64(0)
             for w in range(bits.size):
                 anything |= bits[w]
@@ -217,7 +217,7 @@ def _take_rows(
 
 
 @inlined()
-def _fetch_row(bits: Any, amplitude: Any, at: int) -> None:
+def fetch_row(bits: Any, amplitude: Any, at: int) -> None:
     """Ask for the cells under a row's bits: waiting for them costs more than all the rest."""
     cells = amplitude.ctypes.data + np.uintp(at) * np.uintp(amplitude.shape[1])
     for block in range(0, bits.size - 7, 8):

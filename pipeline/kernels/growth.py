@@ -15,28 +15,44 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.kernels.bits import count_runs
-from pipeline.kernels.compiled import kernel
-from pipeline.kernels.components import NEWEST, TAKEN, ComponentState, flush, note_row, open_runs, retire, take_row
+from pipeline.kernels.compiled import inlined, kernel
+from pipeline.kernels.components import (
+    NEWEST,
+    TAKEN,
+    ComponentState,
+    fetch_row,
+    flush,
+    note_row,
+    open_runs,
+    retire,
+    take_row,
+)
 from pipeline.kernels.links import LinkRule
 from pipeline.kernels.run_cap import CapSettings
 from pipeline.sites import RadarSite
 from pipeline.state import read_only, remembered
 from pipeline.tables import Detections, Plots, Sweeps, VideoFormat
 
-ARRIVED, PENDING, FILLED, SEEDED, SKIPPED = range(5)
+ARRIVED, PENDING, FILLED, REACHED, SKIPPED = range(5)
 """Places in `GrowthState.marks`: newest row that came in, first row not yet looked at, row up to which the bucket of
-runs was filled, newest row with detected cells, and a count."""
+runs was filled, newest row that is near a detected cell so far, and a count."""
+
+
+ROW, REACH, ACTIVE = range(3)
+"""Places in `GrowthState.held_rows`: absolute row, rows about it that are near a detected cell of its own (-1 without),
+and whether anything is near in it (`held_near` is only then up to date)."""
 
 
 @dataclass(frozen=True, eq=False)
 class GrowthWindow:
-    """masks: (rows + 1, words) the range cells at which a cell that many rows away is near. words: (rows + 1) of them
-    with such cells. max_runs: cap on the runs that grow in a turn; a row that does not fit keeps its detected cells
-    only, counted.
+    """masks: (rows + 1, words) the range cells at which a cell that many rows away is near. words: (rows + 1) words
+    with such cells. rows: (words) how far off rows are near at the first cell of each word. max_runs: cap on the runs
+    that grow in a turn; a row that does not fit keeps its detected cells only, counted.
     """
 
     masks: NDArray[np.uint64]
     words: NDArray[np.int64]
+    rows: NDArray[np.int64]
     max_runs: int
 
     @classmethod
@@ -46,21 +62,24 @@ class GrowthWindow:
         near[:, : video.ranges] = (rule.reach[rule.ring_of_cell] >= 0).T
         masks = np.packbits(near, axis=1, bitorder="little").view(np.uint64)
         words = np.array([np.flatnonzero(one)[-1] + 1 if one.any() else 0 for one in masks], np.int64)
-        return cls(masks, words, max_runs)
+        rows = (words > np.arange(video.words)[:, None]).sum(axis=1) - 1
+        return cls(masks, words, rows.astype(np.int64), max_runs)
 
 
 @dataclass(eq=False, kw_only=True)
 class GrowthState(ComponentState):
-    """The open components, and the rows that wait for what comes after them."""
+    """The open components, and the rows that wait for what comes after them: those of the present block stay in it,
+    and are held here only from one block to the next."""
 
     near: GrowthWindow
-    scratch: tuple[NDArray[np.uint64], NDArray[np.uint8], NDArray[np.int64]]
+    scratch: NDArray[np.uint64]
+    waiting: NDArray[np.int64]
     held_cells: NDArray[np.uint8] = remembered()
-    held_bits: NDArray[np.uint64] = remembered()
+    held_growth: NDArray[np.uint64] = remembered()
     held_seeds: NDArray[np.uint64] = remembered()
     held_near: NDArray[np.uint64] = remembered()
     held_sweep: NDArray[np.float64] = remembered()
-    held_row: NDArray[np.int64] = remembered()
+    held_rows: NDArray[np.int64] = remembered()
     marks: NDArray[np.int64] = remembered()
     budget: NDArray[np.float64] = remembered()
 
@@ -73,13 +92,14 @@ class GrowthState(ComponentState):
             site,
             rule,
             near=near,
-            scratch=(np.zeros(video.words, np.uint64), np.zeros(video.ranges, np.uint8), np.full(slots, -1, np.int64)),
+            scratch=np.zeros(video.words, np.uint64),
+            waiting=np.full(slots, -1, np.int64),
             held_cells=np.zeros((slots, video.ranges), np.uint8),
-            held_bits=np.zeros((slots, video.words), np.uint64),
+            held_growth=np.zeros((slots, video.words), np.uint64),
             held_seeds=np.zeros((slots, video.words), np.uint64),
             held_near=np.zeros((slots, video.words), np.uint64),
             held_sweep=np.zeros((slots, 2)),
-            held_row=np.full(slots, -1, np.int64),
+            held_rows=np.full((slots, 3), -1, np.int64),
             marks=np.array([-1, 0, 0, -1, 0], np.int64),
             budget=np.array([CapSettings.of(near.max_runs, video.azimuths).depth]),
             **limits,
@@ -95,14 +115,16 @@ class GrowthState(ComponentState):
     @property
     def held(self) -> tuple[Any, ...]:
         """What the kernels change."""
-        rows = (self.held_cells, self.held_bits, self.held_seeds, self.held_near, self.held_sweep, self.held_row)
-        return (*rows, self.marks, self.budget, *self.scratch)
+        return (
+            self.held_rows, self.held_sweep, self.held_near, self.marks, self.budget, self.scratch, self.waiting,
+            self.held_seeds, self.held_growth, self.held_cells,
+        )  # fmt: skip
 
     @property
     def box(self) -> tuple[Any, ...]:
         """The window, and the bucket."""
         cap = CapSettings.of(self.near.max_runs, self.azimuths)
-        return self.near.masks, self.near.words, cap.refill, cap.depth
+        return self.near.masks, self.near.words, self.near.rows, cap.refill, cap.depth
 
 
 def take_grown_block(sweeps: Sweeps, detections: Detections, state: GrowthState) -> Plots:
@@ -123,7 +145,7 @@ def take_grown_block(sweeps: Sweeps, detections: Detections, state: GrowthState)
 
 def flush_grown(state: GrowthState) -> Plots:
     """Complete all open components, with the rows that still wait."""
-    words, ranges = state.held_bits.shape[1], state.held_cells.shape[1]
+    words, ranges = state.held_seeds.shape[1], state.held_cells.shape[1]
     bits, nothing = read_only(np.zeros((0, words), np.uint64)), read_only(np.zeros(0))
     block = (
         bits,
@@ -152,6 +174,7 @@ def _run(block: tuple[NDArray[Any], ...], first_row: int, state: GrowthState) ->
             columns.arrays,
             state.box,
             state.held,
+            (read_only(state.held_seeds), read_only(state.held_growth), read_only(state.held_cells)),
         )
         made.append(columns.table(int(state.radar[0]), count))
     state.room[0] = sum(len(one) for one in made)
@@ -170,78 +193,97 @@ def _take_rows(
     out: Any,
     box: Any,
     held: Any,
+    kept: Any,
 ) -> int:
     mask, growth, amplitude, rows, azimuth, times = block
-    held_row, marks, waiting = held[5], held[6], held[10]
+    held_rows, marks, waiting = held[0], held[3], held[6]
     numbers = pool[3]
+    video = (mask, growth, amplitude)
     delay = box[1].size - 1
     count = 0
     done = numbers[TAKEN]
     while done < rows.size:
         row = first_row + rows[done]
         if marks[ARRIVED] < row:
-            count, whole = _look_to(
-                row - delay - 1, amplitude, azimuths, rule, limits, pool, scale, out, box, held, count
-            )
+            last = row - delay - 1
+            count, whole = _look_to(last, video, azimuths, rule, limits, pool, scale, out, box, held, kept, count)
             if not whole:
                 break
-            _arrive(row, done, mask[done], growth[done], azimuth[done], times[done], box, held)
-        count, whole = _look_to(row - delay, amplitude, azimuths, rule, limits, pool, scale, out, box, held, count)
-        if not whole:
-            break
+            fetch_row(mask[done], amplitude, done)
+            _arrive(row, done, mask, azimuth[done], times[done], box, held, kept)
         done += 1
     if done == rows.size:
-        newest = marks[ARRIVED] - (delay if rows.size else 0)
-        count, whole = _look_to(newest, amplitude, azimuths, rule, limits, pool, scale, out, box, held, count)
+        last = marks[ARRIVED] - (delay if rows.size else 0)
+        count, whole = _look_to(last, video, azimuths, rule, limits, pool, scale, out, box, held, kept, count)
         if whole and count + open_runs(numbers) <= out[0].shape[1]:
-            numbers[NEWEST] = max(newest, numbers[NEWEST])
+            numbers[NEWEST] = max(last, numbers[NEWEST])
             geometry = (scale[0], scale[1], scale[2])
             count = retire(numbers[NEWEST], azimuths, rule[2].shape[1] - 1, limits, pool, geometry, out, count)
-            for slot in range(held_row.size):
-                if waiting[slot] >= 0 and held_row[slot] >= marks[PENDING]:
-                    _copy_words(amplitude[waiting[slot]], held[1][slot], True, held[0][slot])
+            for slot in range(waiting.size):
+                at = waiting[slot]
+                if at >= 0 and held_rows[slot, ROW] >= marks[PENDING]:
+                    _keep(mask[at], held[7][slot])
+                    _keep(growth[at], held[8][slot])
+                    _keep(amplitude[at], held[9][slot])
                 waiting[slot] = -1
             done += 1
     numbers[TAKEN] = done
     return count
 
 
-@kernel()
-def _arrive(row: int, at: int, seeds: Any, growth: Any, azimuth: float, time: float, box: Any, held: Any) -> None:
-    """Keep a row, and mark what is near between it and the rows that came before."""
-    _, held_bits, held_seeds, held_near, held_sweep, held_row, marks, _, _, _, waiting = held
-    masks, words = box[0], box[1]
-    places = held_row.size - 1
+@inlined()
+def _keep(source: Any, into: Any) -> None:
+    for k in range(into.size):
+        into[k] = source[k]
+
+
+@inlined()
+def _arrive(row: int, at: int, mask: Any, azimuth: float, time: float, box: Any, held: Any, kept: Any) -> None:
+    """Note a row, and mark what is near between it and the rows that came before."""
+    held_rows, held_sweep, held_near, marks, _, _, waiting, _, _, _ = held
+    masks, words, rows_of = box[0], box[1], box[2]
+    places = waiting.size - 1
     slot = row & places
-    bits, kept, near = held_bits[slot], held_seeds[slot], held_near[slot]
+    seeds = mask[at]
     anything = np.uint64(0)
     for w in range(seeds.size):
-        bits[w] = growth[w] | seeds[w]
-        kept[w] = seeds[w]
-        near[w] = np.uint64(0)
         anything |= seeds[w]
-    held_row[slot] = row
+    reach = np.int64(-1)
+    if anything:
+        first = np.int64(0)
+        while not seeds[first]:
+            first += 1
+        reach = rows_of[first]
+    mine = held_rows[slot]
+    mine[ROW], mine[REACH], mine[ACTIVE] = row, reach, 0
     held_sweep[slot, 0], held_sweep[slot, 1] = azimuth, time
     waiting[slot] = at
     marks[ARRIVED] = row
-    if anything:
-        _spread(kept, masks[0], words[0], near)
-    elif row - marks[SEEDED] >= words.size:
-        return
-    for back in range(1, min(words.size, row + 1)):
+    if reach >= 0:
+        _spread(seeds, masks[0], words[0], held_near[slot], mine)
+    # the rows before this one that are near its detected cells, or have such that are near this one
+    farthest = words.size - 1 if marks[REACHED] >= row else reach
+    for back in range(1, min(farthest, row) + 1):
         other = (row - back) & places
-        if held_row[other] == row - back:
-            _spread(held_seeds[other], masks[back], words[back], near)
-            if anything:
-                _spread(kept, masks[back], words[back], held_near[other])
-    if anything:
-        marks[SEEDED] = row
+        theirs = held_rows[other]
+        if theirs[ROW] != row - back:
+            continue
+        if theirs[REACH] >= back:
+            before = mask[waiting[other]] if waiting[other] >= 0 else kept[0][other]
+            _spread(before, masks[back], words[back], held_near[slot], mine)
+        if reach >= back:
+            _spread(seeds, masks[back], words[back], held_near[other], theirs)
+    marks[REACHED] = max(marks[REACHED], row + reach)
 
 
-@kernel()
-def _spread(seeds: Any, mask: Any, words: int, near: Any) -> None:
+@inlined()
+def _spread(seeds: Any, mask: Any, words: int, near: Any, row: Any) -> None:
     """Mark the detected cells of a row, and the cells next to them, within the mask."""
     one, top = np.uint64(1), np.uint64(63)
+    if not row[ACTIVE]:
+        row[ACTIVE] = 1
+        for w in range(near.size):
+            near[w] = np.uint64(0)
     before, here = np.uint64(0), seeds[0] & mask[0]
     for w in range(words):
         after = seeds[w + 1] & mask[w + 1] if w + 1 < words else np.uint64(0)
@@ -249,10 +291,10 @@ def _spread(seeds: Any, mask: Any, words: int, near: Any) -> None:
         before, here = here, after
 
 
-@kernel()
+@inlined()
 def _look_to(
     last: int,
-    amplitude: Any,
+    video: Any,
     azimuths: int,
     rule: Any,
     limits: Any,
@@ -261,60 +303,73 @@ def _look_to(
     out: Any,
     box: Any,
     held: Any,
+    kept: Any,
     count: int,
 ) -> tuple[int, bool]:
     """Look at the waiting rows up to `last`. Gives the count of plots, and False where there was no room for more."""
-    held_cells, _, held_seeds, _, held_sweep, held_row, marks, budget, bits, cells, waiting = held
-    numbers, turn = pool[3], pool[4]
-    geometry = (scale[0], scale[1], scale[2])
+    held_rows, marks, waiting = held[0], held[3], held[6]
     for row in range(marks[PENDING], min(last, marks[ARRIVED]) + 1):
-        slot = row & (held_row.size - 1)
-        if held_row[slot] != row:
+        slot = row & (waiting.size - 1)
+        if held_rows[slot, ROW] != row or not held_rows[slot, ACTIVE]:
             continue
-        if count + open_runs(numbers) > out[0].shape[1]:
+        if count + open_runs(pool[3]) > out[0].shape[1]:
             marks[PENDING] = row
             return count, False
-        if not _choose(row, slot, box, held):
-            continue
-        if waiting[slot] >= 0:
-            _copy_words(amplitude[waiting[slot]], bits, False, cells)
-        else:
-            _copy_words(held_cells[slot], bits, False, cells)
-        grid_row = row % azimuths
-        budget[0] = max(budget[0] - count_runs(bits), 0.0)
-        count = retire(row, azimuths, rule[2].shape[1] - 1, limits, pool, geometry, out, count)
-        note_row(row, grid_row, held_sweep[slot, 0], held_sweep[slot, 1], scale[0], turn)
-        take_row(row, grid_row, azimuths, bits, held_seeds[slot], True, cells, rule, limits, pool, scale)
+        count = _look_at(row, slot, video, azimuths, rule, limits, pool, scale, out, box, held, kept, count)
     marks[PENDING] = max(marks[PENDING], last + 1)
     return count, True
 
 
 @kernel()
-def _choose(row: int, slot: int, box: Any, held: Any) -> bool:
-    """Write the cells of the row that count to the scratch row; False when there are none."""
-    held_bits, held_seeds, held_near = held[1], held[2], held[3]
-    marks, budget, bits = held[6], held[7], held[8]
+def _look_at(
+    row: int,
+    slot: int,
+    video: Any,
+    azimuths: int,
+    rule: Any,
+    limits: Any,
+    pool: Any,
+    scale: Any,
+    out: Any,
+    box: Any,
+    held: Any,
+    kept: Any,
+    count: int,
+) -> Any:
+    """Take a row of which all that is near is known. Gives the new count of plots."""
+    _, held_sweep, held_near, marks, budget, bits, waiting, _, _, _ = held
+    at = waiting[slot]
+    seeds = video[0][at] if at >= 0 else kept[0][slot]
+    growth = video[1][at] if at >= 0 else kept[1][slot]
+    cells = video[2][at] if at >= 0 else kept[2][slot]
+    if _choose(row, seeds, growth, held_near[slot], bits, box, marks, budget):
+        grid_row = row % azimuths
+        geometry = (scale[0], scale[1], scale[2])
+        count = retire(row, azimuths, rule[2].shape[1] - 1, limits, pool, geometry, out, count)
+        note_row(row, grid_row, held_sweep[slot, 0], held_sweep[slot, 1], scale[0], pool[4])
+        take_row(row, grid_row, azimuths, bits, seeds, True, cells, rule, limits, pool, scale)
+    return count
+
+
+@inlined()
+def _choose(row: int, seeds: Any, growth: Any, near: Any, bits: Any, box: Any, marks: Any, budget: Any) -> bool:
+    """Write the cells of the row that count; False when there are none."""
     anything = np.uint64(0)
-    grown, kept, near = held_bits[slot], held_seeds[slot], held_near[slot]
     for w in range(bits.size):
-        bits[w] = kept[w] | (grown[w] & near[w])
-        anything |= bits[w]
+        word = seeds[w] | (growth[w] & near[w])
+        bits[w] = word
+        anything |= word
     if not anything:
         return False
-    budget[0] = min(budget[0] + box[2] * (row - marks[FILLED]), box[3])
+    budget[0] = min(budget[0] + box[3] * (row - marks[FILLED]), box[4])
     marks[FILLED] = row
-    if count_runs(bits) > budget[0]:
+    runs = count_runs(bits)
+    if runs > budget[0]:
         marks[SKIPPED] += 1
         anything = np.uint64(0)
         for w in range(bits.size):
-            bits[w] = kept[w]
-            anything |= bits[w]
+            bits[w] = seeds[w]
+            anything |= seeds[w]
+        runs = count_runs(bits)
+    budget[0] = max(budget[0] - runs, 0.0)
     return bool(anything)
-
-
-@kernel()
-def _copy_words(source: Any, bits: Any, whole: bool, cells: Any) -> None:
-    for w in range(bits.size):
-        if whole or bits[w]:
-            for j in range(64 * w, min(64 * w + 64, cells.size)):
-                cells[j] = source[j]

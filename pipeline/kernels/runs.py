@@ -27,13 +27,14 @@ RUN = np.dtype(
         ("seeds", "i4"),
         ("total", "i4"),
         ("peak", "i4"),
-        ("spare", "i8"),
+        ("low", "i4"),
+        ("spare", "i4"),
     ]
 )
 """weight, moment: sum over the cells of linear amplitude, and of it times ground range. start, end: range cells
 [start, end). ring: ring of the link rule. row: in the azimuth grid. parent: union-find (FREE: delivered). next: the
 next run of the component, which is a ring of runs. last: in a root, the component's last row in the grid. seeds: cells
-that the detector found. total, peak: sum and greatest of the log amplitudes."""
+that the detector found. total, peak, low: sum, greatest and least of the log amplitudes."""
 
 FREE = -1
 
@@ -167,13 +168,14 @@ def find_runs(
                 dropped += 1
                 begin = end
                 continue
-            total = peak = np.int64(cells[begin])
+            total = peak = low = np.int64(cells[begin])
             weight = loudness[total]
             moment = weight * ground[begin]
             for j in range(begin + 1, end):
                 value = np.int64(cells[j])
                 total += value
                 peak = max(peak, value)
+                low = min(low, value)
                 loud = loudness[value]
                 weight += loud
                 moment += loud * ground[j]
@@ -182,7 +184,7 @@ def find_runs(
             run.start, run.end, run.ring, run.row = begin, end, ring, row
             run.parent, run.next, run.last = head, head, row
             run.seeds = count_set(seeds, begin, end) if grown else end - begin
-            run.total, run.peak = total, peak
+            run.total, run.peak, run.low = total, peak, low
             # the neighbour in the row is enough: the reach falls with range, so what links over a run links to it
             if head > first and begin - (np.int64(runs[head - 1].end) - 1) <= reach[ring, 0]:
                 unite(runs, find(runs, head - 1), head, row)

@@ -1,4 +1,4 @@
-"""The extraction experiment: what it counts as split and merged."""
+"""The extraction experiment: what it counts as split and merged, and that plots know how wrong they are."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
-from pipeline.evaluate.extraction import ALONE, MERGED, PAIRS, SPLIT, Extraction
+from pipeline.evaluate.extraction import ALONE, MERGED, NEES, PAIRS, SPLIT, Extraction
 
 SMALL = replace(Extraction(), trials=12, ranges_m=(400.0, 1000.0), snr_db=(22.0,))
 
@@ -40,6 +41,16 @@ def test_what_is_merged_is_seen_as_merged() -> None:
     results = [far.trial(np.random.default_rng([1, k]), k, lambda: 0.0)["found"] for k in range(4)]
     merged = np.stack(results)[:, 1, 0, len(ALONE) :, 0, MERGED]
     assert merged[:, 0].mean() > 0.5
+
+
+@pytest.mark.parametrize("extractor", ["hysteresis", "manhattan"])
+def test_the_covariance_is_honest(found: dict[str, np.ndarray], extractor: str) -> None:
+    """The sum of the errors squared over their covariances is chi-square with two degrees of freedom a plot, if the
+    covariance is right. It need not be right, but within a factor of two on average, rather too large."""
+    nees = 2 * found[extractor][:, :4, :, NEES]
+    nees = nees[np.isfinite(nees) & (found[extractor][:, :4, :, SPLIT] == 0)]
+    low, high = chi2.ppf([1e-4, 1 - 1e-4], 2 * len(nees)) / 2
+    assert 0.5 * low <= nees.sum() / 2 <= 2.0 * high
 
 
 def test_rows_and_figures_of_a_short_run() -> None:
