@@ -123,7 +123,12 @@ class RadarChain:
         self._check_origin(saved, besides="extract")
         if not (-1 <= rows[0] < 2**48 and 0 <= rows[2] < 2**32):
             raise StateError("the saved rows cannot be true")
-        self._detecting.restore(_under("detect.", saved))
+        learned = _under("detect.", saved)
+        for name, array in learned.items():
+            least = 0 if name == "budget" else -np.inf
+            if array.dtype.kind == "f" and not (np.isfinite(array) & (array >= least)).all():
+                raise StateError(f"{name}: numbers that cannot be true")
+        self._detecting.restore(learned)
         self._scans_before = int(rows[2] - -rows[0] // self.site.video.azimuths)
         self._carry({})
 

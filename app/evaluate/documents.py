@@ -113,14 +113,23 @@ def _section(run: Run) -> Iterable[str]:
     yield f"- Settings: {_cell(words.settings_line(made))}"
     yield f"- {run.trials} trials, seed {run.seed}{', quick' if run.quick else ''}, {words.duration(run.seconds)}"
     yield ""
-    asked = any(row.wanted is not None for row in run.rows)
+    first, others = words.parted(run.rows)
+    yield from _rows(first)
+    if others:
+        yield from ("", f"<details><summary>{len(others)} more rows, with nothing to compare with</summary>", "")
+        yield from _rows(others)
+        yield from ("", "</details>")
+
+
+def _rows(rows: Sequence[Row]) -> Iterable[str]:
+    asked = any(row.wanted is not None for row in rows)
     head, body = ["row", "paper", "ours", "95 % interval", "unit", "verdict"], []
-    for row in run.rows:
+    for row in rows:
         line = [row.name, words.figure(row.paper), words.figure(row.measured), words.interval(row), row.unit]
         line.append(f"**{row.verdict}**" if row.verdict == "not reproduced" else row.verdict)
         kept = words.met(row)
         body.append([*line, words.wanted(row), f"**{kept}**" if row.met is False else kept] if asked else line)
-    yield from _table([*head, "wanted", ""] if asked else head, body, "lrrrllrl")
+    return _table([*head, "wanted", ""] if asked else head, body, "lrrrllrl")
 
 
 def _table(head: Sequence[str], body: Sequence[Sequence[str]], sides: str) -> Iterable[str]:

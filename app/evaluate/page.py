@@ -82,25 +82,32 @@ def _several(runs: Sequence[Run], left_out: Sequence[str]) -> str:
 
 
 def _body(run: Run) -> str:
-    asked = any(row.wanted is not None for row in run.rows)
-    compared = asked or any(row.paper is not None for row in run.rows)
-    head = [("", ""), ("paper", "n"), ("ours", "n"), ("95 % interval", ""), ("unit", "")]
-    head += [("ours beside it", "")] if compared else []
-    head += [("verdict", "")]
-    head += [("wanted", "")] if asked else []
+    first, others = words.parted(run.rows)
     facts = {"trials": run.trials, "seed": run.seed, "took": words.duration(run.seconds)}
     facts |= words.settings_of(run.experiment)
     listed = "".join(f"<dt>{escape(k)}</dt><dd>{escape(words.said(v))}</dd>" for k, v in facts.items())
     said = f"{'the short version, ' if run.quick else ''}{run.trials} trials, seed {run.seed}"
+    more = f"{len(others)} more rows, with nothing to compare with"
     return "".join(
         (
             f'<p class="reading"><b>Reading</b>{escape(run.experiment.reading)}</p>\n',
-            _table(head, [_row(row, asked, compared) for row in run.rows], f"Results of {run.name}"),
-            key(asked) if compared else "",
+            _results(first, f"Results of {run.name}"),
+            f"<details><summary>{more}</summary>\n{_results(others, more, long=True)}</details>\n" if others else "",
             *(_figure(figure, f"{run.name}-{k}") for k, figure in enumerate(run.figures())),
             f"<details><summary>Settings: {said}</summary>\n<dl>{listed}</dl></details>\n",
         )
     )
+
+
+def _results(rows: Sequence[Row], label: str, long: bool = False) -> str:
+    asked = any(row.wanted is not None for row in rows)
+    compared = asked or any(row.paper is not None for row in rows)
+    head = [("", ""), ("paper", "n"), ("ours", "n"), ("95 % interval", ""), ("unit", "")]
+    head += [("ours beside it", "")] if compared else []
+    head += [("verdict", "")]
+    head += [("wanted", "")] if asked else []
+    body = [_row(row, asked, compared) for row in rows]
+    return _table(head, body, label, long) + (key(asked) if compared else "")
 
 
 def _row(row: Row, asked: bool, compared: bool) -> str:
@@ -126,10 +133,10 @@ def _chip(word: str) -> str:
     return f'<span class="chip {kind}">{sign} {word}</span>'
 
 
-def _table(head: Sequence[tuple[str, str]], body: Iterable[str], label: str) -> str:
+def _table(head: Sequence[tuple[str, str]], body: Iterable[str], label: str, long: bool = False) -> str:
     cells = "".join(f'<th scope="col" class="{kind}">{escape(one)}</th>' for one, kind in head)
     return (
-        f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(label)}">\n'
+        f'<div class="scroll{" long" if long else ""}" tabindex="0" role="region" aria-label="{escape(label)}">\n'
         f"<table>\n<thead><tr>{cells}</tr></thead>\n<tbody>\n{''.join(body)}</tbody>\n</table>\n</div>\n"
     )
 

@@ -43,6 +43,8 @@ _STYLE: dict[Any, Any] = {
 MARKED = 30
 """Up to so many points of a line are marked."""
 WIDTH, HEIGHT = 11.0, 4.9
+PAGE, LEAST = 1090, 620
+"""Width in pixels of a plot that is WIDTH wide, and what no plot is narrower than: narrow screens scroll it."""
 
 
 @dataclass(frozen=True)
@@ -145,11 +147,12 @@ def _pictures(figure: Figure) -> Canvas:
     for k, (picture, (wide, high)) in enumerate(zip(figure.pictures, shape, strict=True)):
         axes = canvas.add_subplot(rows, columns, k + 1)
         values = np.asarray(picture.values)
+        yes_or_no = values.dtype.kind in "bu" and bool(values.max(initial=0) <= 1)
         drawn = axes.imshow(
             values.astype(np.float32),
             origin="lower",
             extent=picture.extent,
-            cmap="Greys_r" if values.dtype == bool else "viridis",
+            cmap="Greys_r" if yes_or_no else "viridis",
             aspect="equal" if 0.3 <= high / wide <= 3.0 else "auto",
             interpolation="nearest",
         )
@@ -159,7 +162,7 @@ def _pictures(figure: Figure) -> Canvas:
         if picture.marks is not None and len(picture.marks):
             marks = np.asarray(picture.marks, np.float64)
             axes.plot(marks[:, 0], marks[:, 1], "+", color="#ff4d4f", markersize=9, markeredgewidth=1.6)
-        if values.dtype != bool:
+        if not yes_or_no:
             bar = canvas.colorbar(drawn, cax=axes.inset_axes((1.025, 0.0, 0.03, 1.0)))
             bar.set_label(_text(picture.unit))
             bar.outline.set_visible(False)
@@ -186,7 +189,10 @@ def _inline(document: str, figure: Figure) -> str:
     text = re.sub(r"font: ([\d.]+)px '[^;\"]*", r"font: \1px system-ui, 'DejaVu Sans', sans-serif", text)
     text = re.sub(r' (?:width|height)="[\d.]+pt"', "", text, count=2)
     title = figure.title.replace("&", "&amp;").replace("<", "&lt;").replace('"', "&quot;")
-    return text.replace("<svg", f'<svg role="img" aria-label="{title}"', 1).strip()
+    size = re.search(r'viewBox="0 0 ([\d.]+)', text)
+    wide = round((float(size[1]) if size else 72 * WIDTH) * PAGE / (72 * WIDTH))
+    style = f"max-width: {wide}px; min-width: {min(wide, LEAST)}px"  # narrow pictures are not blown up
+    return text.replace("<svg", f'<svg role="img" aria-label="{title}" style="{style}"', 1).strip()
 
 
 def _positive(values: Iterable[Any]) -> bool:

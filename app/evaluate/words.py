@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
 from pathlib import Path
@@ -90,6 +90,18 @@ def plain(value: Any) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         return {one.name: plain(getattr(value, one.name)) for one in fields(value)}
     return value.name if isinstance(value, Path) else str(value)
+
+
+LONG = 25
+"""Rows beyond which a table shows first what there is something to compare with."""
+
+
+def parted(rows: Sequence[Row]) -> tuple[list[Row], list[Row]]:
+    """(rows to show at once, the others): of a long table, those with a figure in the paper or a wanted bound first."""
+    first = [row for row in rows if row.paper is not None or row.wanted is not None]
+    if len(rows) <= LONG or not first:
+        return list(rows), []
+    return first, [row for row in rows if row.paper is None and row.wanted is None]
 
 
 @dataclass(frozen=True)

@@ -29,11 +29,11 @@ SEEN_TURNS = 3
 
 @dataclass(frozen=True)
 class RealVideo:
-    """Every detector, and one extractor, over a recording that is played again and again for `turns` turns.
+    """Every detector with every extractor over a recording that is played again and again for `turns` turns.
 
-    video: the recording. detectors: one a trial. extractor: name of the part. pfa: nominal. least_cells: of the plots
-    whose steadiness is told, and of fixed things. near_m: how near a plot must be found again. turns: of which 20
-    learn.
+    video: the recording. detectors, extractors (names of parts): a pair of them is a trial. pfa: nominal. least_cells:
+    of the plots whose steadiness is told, and of fixed things. near_m: how near a plot must be found again. turns: of
+    which 20 learn.
     """
 
     title: str = "A real radar's video: plots a scan and how steady they are"
@@ -42,13 +42,14 @@ class RealVideo:
         "video of fewer than 8 bits is stretched to 8, of more bits cut; nothing tells how many decibels a step is:"
         " full scale is taken for 80 dB (0.3125 dB an 8-bit step, the chain's own default); no map; the recording is"
         " repeated after its last turn, so a turn comes back. 20 turns learn. Found again: a plot of 4 cells or more"
-        " has a plot within 15 m in the next turn. Fixed thing: 4 or more adjacent cells, each above three quarters of"
+        " has a plot within 15 m in the next turn; large echoes of land move their centroid more, hence the overlap of"
+        " windows beside it. Fixed thing: 4 or more adjacent cells, each above three quarters of"
         " full scale in nine of ten turns; seen in a turn when any of its cells is detected"
     )
-    trials: int = field(default_factory=lambda: len(every_part()))
+    trials: int = field(default_factory=lambda: 2 * len(every_part()))
     video: RecordedVideo | None = None
     detectors: tuple[Case, ...] = field(default_factory=every_part)
-    extractor: str = "manhattan"
+    extractors: tuple[str, ...] = ("manhattan", "hysteresis")
     pfa: float = 1e-6
     least_cells: int = 4
     near_m: float = 15.0
@@ -63,14 +64,16 @@ class RealVideo:
         return self
 
     def trial(self, chance: np.random.Generator, number: int, clock: Callable[[], float]) -> Trial:
-        """Of detector `number`: plots (n, 4) turn, east, north, cells; degraded (turns); seen (fixed things, 2) after
-        learning and 15 turns later. Raises ValueError without a recording, or for one that cannot be used."""
+        """Of one pair: plots (n, 8) turn, east, north, cells and window of each; degraded (turns); seen (fixed things,
+        2) after learning and 15 turns later. Raises ValueError without a recording, or for one that cannot be used."""
         video = self._usable()
         octets = to_octets(video.scans, video.bits)
         site = RadarSite("recording", 0.0, 0.0, 0.0, video_format(video))
-        detector = self.detectors[number % len(self.detectors)].detector(self.pfa)
-        extractor = build("extract", self.extractor)
-        detecting, extracting = detector.start(site.video), extractor.start(site)
+        pairs = self._pairs()
+        case, method = pairs[number % len(pairs)]
+        detector, extractor = case.detector(self.pfa), build("extract", method)
+        detecting = detector.start(site.video, growth_db=getattr(extractor, "growth_db", None))
+        extracting = extractor.start(site)
         plots, degraded = [], np.zeros(self.turns, bool)
         things, many = fixed_things(octets, self.least_cells)
         seen = np.zeros((many + 1, 2), bool)
@@ -89,17 +92,20 @@ class RealVideo:
     def rows(self, results: Sequence[Trial]) -> tuple[Row, ...]:
         """Plots a turn, their steadiness, fixed things kept, degraded turns: of each detector."""
         rows: list[Row] = []
-        for case, result in zip(self.detectors, results, strict=False):
+        judged = range(LEARN_TURNS, self.turns)
+        for (case, method), result in zip(self._pairs(), results, strict=False):
             plots = result["plots"]
-            judged = range(LEARN_TURNS, self.turns)
+            name = f"{case.label}, {method}"
             counts = np.array([(plots[:, 0] == turn).sum() for turn in judged])
-            rows.append(_counted(f"{case.label}: plots a turn", counts))
+            rows.append(_counted(f"{name}: plots a turn", counts))
             large = plots[plots[:, 3] >= self.least_cells]
             counts = np.array([(large[:, 0] == turn).sum() for turn in judged])
-            rows.append(_counted(f"{case.label}: plots of {self.least_cells} cells or more a turn", counts))
-            again, tries = self._again(plots, large)
-            rows.append(_share(f"{case.label}: of these, found again within {self.near_m:g} m in the next turn",
-                               again, tries))  # fmt: skip
+            rows.append(_counted(f"{name}: plots of {self.least_cells} cells or more a turn", counts))
+            near, over, tries = self._again(plots, large)
+            rows.append(_share(f"{name}: of these, found again within {self.near_m:g} m in the next turn", near, tries))
+            rows.append(_share(f"{name}: of these, overlapped by a plot of the next turn", over, tries))
+            if method != self.extractors[0]:
+                continue
             seen = result["seen"]
             first = int(seen[:, 0].sum())
             rows.append(_share(f"{case.label}: fixed things of the recording seen", first, len(seen)))
@@ -115,12 +121,12 @@ class RealVideo:
         lines, pictures = [], []
         video = self._usable()
         reach = video.first_range_m + video.range_step_m * video.scans.shape[2]
-        for case, result in zip(self.detectors, results, strict=False):
-            plots = result["plots"]
+        for (case, method), result in zip(self._pairs(), results, strict=False):
+            plots, name = result["plots"], f"{case.label}, {method}"
             counts = np.bincount(plots[:, 0].astype(int), minlength=self.turns)
-            lines.append(Line(case.label, turns, counts[: self.turns].astype(np.float64)))
+            lines.append(Line(name, turns, counts[: self.turns].astype(np.float64)))
             marks = plots[(plots[:, 0] == self.turns - 2) & (plots[:, 3] >= self.least_cells), 1:3]
-            pictures.append((case.label, marks))
+            pictures.append((name, marks))
         picture = results[0]["picture"]
         made = [Figure("Plots a turn", "turn", "plots", tuple(lines), log_y=True)]
         for name, marks in pictures:
@@ -130,6 +136,9 @@ class RealVideo:
                                pictures=(drawn,)))  # fmt: skip
         return tuple(made)
 
+    def _pairs(self) -> list[tuple[Case, str]]:
+        return [(case, method) for method in self.extractors for case in self.detectors]
+
     def _usable(self) -> RecordedVideo:
         if self.video is None:
             raise ValueError("this experiment works on a recording of radar video: say which (--file)")
@@ -137,12 +146,16 @@ class RealVideo:
             raise ValueError(f"a recording is turns of 16 azimuths x 16 cells or more, not {self.video.scans.shape}")
         return self.video
 
-    def _again(self, plots: NDArray[np.float64], large: NDArray[np.float64]) -> tuple[int, int]:
-        hits = tries = 0
+    def _again(self, plots: NDArray[np.float64], large: NDArray[np.float64]) -> tuple[int, int, int]:
+        """How many plots have a plot near them in the next turn; how many one whose window overlaps; of how many."""
+        near = over = tries = 0
+        azimuths = self._usable().scans.shape[1]
         for turn in range(LEARN_TURNS, self.turns - 2):  # the last turn's plots at its end are not all complete
-            found = self._near(large[large[:, 0] == turn], plots[plots[:, 0] == turn + 1])
-            hits, tries = hits + int(found.sum()), tries + len(found)
-        return hits, tries
+            these, others = large[large[:, 0] == turn], plots[plots[:, 0] == turn + 1]
+            near += int(self._near(these, others).sum())
+            over += int(_overlapping(these[:, 4:], others[:, 4:], azimuths).sum())
+            tries += len(these)
+        return near, over, tries
 
     def _near(self, wanted: NDArray[np.float64], there: NDArray[np.float64]) -> NDArray[np.bool_]:
         if not len(wanted) or not len(there):
@@ -190,16 +203,26 @@ def _block(video: VideoFormat, turn: int, amplitude: NDArray[np.uint8]) -> Sweep
     return Sweeps(0, turn, row, 2 * pi * share, 1000.0 + video.period_s * (turn + share), amplitude, last=True)
 
 
+def _overlapping(these: NDArray[np.float64], others: NDArray[np.float64], azimuths: int) -> NDArray[np.bool_]:
+    """Which of the windows (first row, rows, first cell, cells) share a cell with any of the others."""
+    ahead = (others[None, :, 0] - these[:, None, 0]) % azimuths
+    rows = (ahead < these[:, None, 1]) | ((-ahead) % azimuths < others[None, :, 1])
+    ends, other_ends = these[:, 2] + these[:, 3], others[:, 2] + others[:, 3]
+    cells = (others[None, :, 2] < ends[:, None]) & (these[:, None, 2] < other_ends[None, :])
+    return np.asarray((rows & cells).any(axis=1))
+
+
 def _columns(plots: Any) -> NDArray[np.float64]:
-    return np.stack([plots.scan, plots.east, plots.north, plots.cells], axis=1).astype(np.float64)
+    columns = [plots.scan, plots.east, plots.north, plots.cells, *np.asarray(plots.window).reshape(-1, 4).T]
+    return np.stack(columns, axis=1).astype(np.float64)
 
 
 def _picture(octets: NDArray[np.uint8], side: int = 400) -> NDArray[np.float32]:
-    """(side, side) mean of the turns, north up."""
+    """(side, side) mean of the turns, from south to north."""
     mean = octets.mean(axis=0, dtype=np.float32)
     azimuths, ranges = mean.shape
     axis = (np.arange(side) + 0.5) / side * 2 - 1
-    east, north = np.meshgrid(axis, -axis)
+    east, north = np.meshgrid(axis, axis)
     row = (np.mod(np.arctan2(east, north), 2 * pi) / (2 * pi) * azimuths).astype(int) % azimuths
     cell = (np.hypot(east, north) * ranges).astype(int)
     return np.where(cell < ranges, mean[row, np.minimum(cell, ranges - 1)], np.float32(0))

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from app.evaluate.circumstances import circumstances
+from app.evaluate.documents import markdown
 from app.evaluate.gauge import gauge
 from app.evaluate.page import page
 from app.evaluate.plots import looks, svg
@@ -42,6 +44,18 @@ def test_what_is_told_is_escaped_and_complete(pages: dict[str, str]) -> None:
     for word in ("Reading", "NOT MET", "not reproduced", "airside evaluate all --seed 1 --quick", "numpy", "snr_db"):
         assert word in pages["toy"], word
     assert pages["toy"].count("<figure>") == len(Toy().figures([]))
+
+
+def test_a_long_table_shows_first_what_there_is_something_to_compare_with() -> None:
+    run = carry_out("toy", Toy(trials=2))
+    more = tuple(Row(f"cell {number}", 1.0, 0.9, 1.1, "dB") for number in range(40))
+    long = replace(run, rows=(*run.rows, *more))
+    for text in (page("toy", [long], [], ABOUT), markdown([long], [], ABOUT)):
+        before, after = text.split("41 more rows", 1)
+        assert "NOT MET" in before
+        assert "cell 7" not in before
+        assert "cell 39" in after
+    assert "more rows" not in page("toy", [run], [], ABOUT)
 
 
 def test_names_inside_the_page_are_unique_and_lead_somewhere(pages: dict[str, str]) -> None:

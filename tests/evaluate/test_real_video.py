@@ -11,7 +11,7 @@ import pytest
 from pipeline.assemble.bit_depth import to_octets
 from pipeline.evaluate import RecordedVideo
 from pipeline.evaluate.cfar_cases import CASES, every_part
-from pipeline.evaluate.real_video import RealVideo, fixed_things, video_format
+from pipeline.evaluate.real_video import RealVideo, _overlapping, fixed_things, video_format
 
 THINGS = ((10, 30), (40, 60), (70, 100))
 
@@ -29,7 +29,8 @@ def recording(bits: int, azimuths: int = 90, ranges: int = 130, turns: int = 6) 
 
 def rows_of(experiment: RealVideo) -> dict[str, float]:
     results = [
-        experiment.trial(np.random.default_rng(k), k, time.perf_counter) for k in range(len(experiment.detectors))
+        experiment.trial(np.random.default_rng(k), k, time.perf_counter)
+        for k in range(len(experiment.detectors) * len(experiment.extractors))
     ]
     assert all(one.lines or one.pictures for one in experiment.figures(results))
     return {row.name: row.measured for row in experiment.rows(results)}
@@ -41,11 +42,13 @@ def test_every_detector_sees_what_stands_still_and_makes_no_flood() -> None:
         # what stood there from the first turn on is clutter to a map of single cells
         seen = 0.0 if case.part == "clutter_map" else 100.0
         assert rows[f"{case.label}: fixed things of the recording seen"] == seen, case.label
-        assert rows[f"{case.label}: plots a turn"] < 8
+        for extractor in ("manhattan", "hysteresis"):
+            assert rows[f"{case.label}, {extractor}: plots a turn"] < 8
         assert rows[f"{case.label}: degraded turns of 20"] == 0
     for label in ("hybrid", "adaptive"):
         assert rows[f"{label}: of these, still seen after 15 turns"] == 100.0
-        assert rows[f"{label}: of these, found again within 15 m in the next turn"] > 95.0
+        assert rows[f"{label}, manhattan: of these, found again within 15 m in the next turn"] > 95.0
+        assert rows[f"{label}, manhattan: of these, overlapped by a plot of the next turn"] > 95.0
 
 
 @pytest.mark.parametrize(("bits", "azimuths", "ranges"), [(1, 64, 130), (4, 100, 129), (6, 90, 1000), (12, 720, 140),
@@ -95,6 +98,13 @@ def test_fixed_things_are_told_from_the_recording_alone() -> None:
     for row, cell in THINGS:
         assert len(np.unique(things[row : row + 4, cell : cell + 5])) == 1
     assert np.count_nonzero(things) == 20 * len(THINGS)
+
+
+def test_windows_overlap_across_north() -> None:
+    these = np.array([[86.0, 6.0, 10.0, 5.0], [20.0, 2.0, 10.0, 5.0]])
+    others = np.array([[0.0, 3.0, 14.0, 4.0], [20.0, 2.0, 15.0, 5.0]])
+    assert _overlapping(these, others, 90).tolist() == [True, False]
+    assert _overlapping(others, these, 90).tolist() == [True, False]
 
 
 def test_the_grid_follows_the_recording() -> None:
