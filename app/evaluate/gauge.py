@@ -17,8 +17,10 @@ def gauge(row: Row) -> str:
     if not marks or not math.isfinite(row.measured):
         return ""
     low, high = (end if math.isfinite(end) else row.measured for end in (row.low, row.high))
-    values = [row.measured, low, high, *marks]
+    near = [] if row.paper is None else [row.paper - row.tolerance, row.paper + row.tolerance]
+    values = [row.measured, low, high, *marks, *near]
     at = _scale(values)
+    band = f'<path d="M{at(near[0]):.1f} 12H{at(near[1]):.1f}" stroke="var(--grid)" stroke-width="16"/>' if near else ""
     paper = (
         f'<path d="M{at(row.paper):.1f} 4v16" stroke="var(--dim)" stroke-width="2.5"/>' if row.paper is not None else ""
     )
@@ -28,7 +30,7 @@ def gauge(row: Row) -> str:
     told += f", wanted {words.wanted(row)}" if row.wanted is not None else ""
     return (
         f'<svg viewBox="0 0 {WIDE:.0f} 24" role="img" aria-label="{told}" fill="none">'
-        f'<path d="M{EDGE / 2:.0f} 12H{WIDE - EDGE / 2:.0f}" stroke="var(--grid)"/>{paper}{_bound(row, at)}'
+        f'<path d="M{EDGE / 2:.0f} 12H{WIDE - EDGE / 2:.0f}" stroke="var(--grid)"/>{band}{paper}{_bound(row, at)}'
         f'<path d="M{at(low):.1f} 12H{at(high):.1f}" stroke="{colour}" stroke-width="3" opacity=".45"/>'
         f'<circle cx="{at(row.measured):.1f}" cy="12" r="4.2" fill="{colour}" stroke="var(--card)"/></svg>'
     )
@@ -44,7 +46,7 @@ def key(asked: bool) -> str:
     bound = '<path d="M11 0v14M11 7h6M14 4l3 3-3 3" stroke="var(--accent)" stroke-width="1.6"/>'
     signs = [
         (ours, "ours with its 95 % interval"),
-        (paper, "the paper"),
+        (paper, "the paper, and what counts as reproduced"),
         *([(bound, "wanted: this way")] if asked else []),
     ]
     told = "".join(
