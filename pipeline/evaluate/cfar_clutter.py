@@ -27,20 +27,22 @@ LAWS = (
 class CfarClutter:
     """Homogeneous ground of several laws of amplitude.
 
-    detectors: which. nominal: false alarm probabilities they are set for. laws: of the clutter. learn_scans: seen
-    before it is measured.
+    detectors: which. nominal: false alarm probabilities they are set for. laws: of the clutter. beam_rows: azimuths
+    that share their speckle in a further case, Rayleigh; two is usual. learn_scans: seen before it is measured.
     """
 
     title: str = "Pfa on Rayleigh, Weibull and K clutter"
     source: str = "Galati et al., section 3B: the expected Pfa, typically 1e-6; no figures off Rayleigh"
     reading: str = (
-        "512 x 256 cells of one level, independent from cell to cell and scan to scan; shape: of the Weibull amplitude"
-        " (2 is Rayleigh), order nu of K; Pfa integrated over the law, given the thresholds learned"
+        "512 x 256 cells of one level, independent from scan to scan and, but for the last case, from cell to cell;"
+        " shape: of the Weibull amplitude (2 is Rayleigh), order nu of K; Pfa integrated over the law, given the"
+        " thresholds learned"
     )
     trials: int = 6
     detectors: tuple[Case, ...] = field(default_factory=every_part)
     nominal: tuple[float, ...] = (1e-4, 1e-6)
     laws: tuple[Law, ...] = LAWS
+    beam_rows: int = 2
     learn_scans: int = 100
 
     def quick(self) -> Self:
@@ -48,10 +50,11 @@ class CfarClutter:
         return replace(self, trials=1, learn_scans=40)
 
     def trial(self, chance: np.random.Generator, number: int, clock: Callable[[], float]) -> Trial:
-        """pfa: (nominal, laws, detectors)."""
-        made = np.zeros((len(self.nominal), len(self.laws), len(self.detectors)))
-        for k, law in enumerate(self.laws):
-            scene = Ground.homogeneous(number, law).build()
+        """pfa: (nominal, cases of clutter, detectors)."""
+        grounds = self._grounds(number)
+        made = np.zeros((len(self.nominal), len(grounds), len(self.detectors)))
+        for k, ground in enumerate(grounds):
+            scene, law = ground.build(), ground.law
             kind = np.zeros(scene.kind.shape, np.int64)
             watches = [Watch(self.detectors, scene, pfa) for pfa in self.nominal]
             for block in scene.clutter(chance, range(self.learn_scans)):
@@ -69,14 +72,14 @@ class CfarClutter:
         pfa = self._pfa(results)
         rows: list[Row] = []
         for n, nominal in enumerate(self.nominal):
-            for k, law in enumerate(self.laws):
+            for k, ground in enumerate(self._grounds(0)):
                 for d, case in enumerate(self.detectors):
                     trials = pfa[:, n, k, d]
                     low, high = mean_interval(trials)
-                    name = f"{case.label}, Pfa on {_said(law)}, nominal {nominal:.0e}"
+                    name = f"{case.label}, Pfa on {_said(ground)}, nominal {nominal:.0e}"
                     rows.append(Row(name, float(trials.mean()), max(low, 0.0), high, ""))
-                    if case.label == "adaptive" and law.family != "k":
-                        rows.append(_times_off(f"{case.label}, times off on {_said(law)}, nominal {nominal:.0e}",
+                    if case.label == "adaptive" and ground.law.family != "k":
+                        rows.append(_times_off(f"{case.label}, times off on {_said(ground)}, nominal {nominal:.0e}",
                                                trials / nominal))  # fmt: skip
         return tuple(rows)
 
@@ -99,6 +102,10 @@ class CfarClutter:
                                note=f"The {CLAIRVOYANT} has the nominal Pfa everywhere."))  # fmt: skip
         return tuple(made)
 
+    def _grounds(self, number: int) -> list[Ground]:
+        grounds = [Ground.homogeneous(number, law) for law in self.laws]
+        return [*grounds, replace(Ground.homogeneous(number), beam_rows=self.beam_rows)]
+
     def _pfa(self, results: Sequence[Trial]) -> NDArray[np.float64]:
         return np.stack([one["pfa"] for one in results])
 
@@ -106,9 +113,10 @@ class CfarClutter:
 EXPERIMENT = CfarClutter
 
 
-def _said(law: Law) -> str:
+def _said(ground: Ground) -> str:
+    law = ground.law
     if law.family == "rayleigh":
-        return "Rayleigh"
+        return "Rayleigh" if ground.beam_rows == 1 else f"Rayleigh, {ground.beam_rows} azimuths a beam"
     return f"Weibull {law.shape:g}" if law.family == "weibull" else f"K nu {law.shape:g}"
 
 

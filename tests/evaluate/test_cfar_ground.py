@@ -10,7 +10,7 @@ from scipy.stats import binom
 
 from pipeline.airport.model import SurfaceKind
 from pipeline.evaluate.cfar_law import Law, swerling3_draw, swerling3_survival
-from pipeline.evaluate.ground import ASPHALT, STRONG, SURFACES, WEAK, Ground, Rain
+from pipeline.evaluate.ground import ASPHALT, STRONG, SURFACES, WEAK, Ground, Rain, _draw
 from pipeline.evaluate.statistics import mean_interval, rms_interval, wilson
 
 LAWS = [Law(), Law("weibull", 1.2), Law("weibull", 1.6), Law("k", 1.0), Law("k", 5.0)]
@@ -82,6 +82,19 @@ def test_gusts_move_the_grass_slowly_and_nothing_else() -> None:
     np.testing.assert_array_equal(first[asphalt], later[asphalt])
     assert np.abs(second - first)[grass].max() < 0.5
     assert np.abs(later - first)[grass].max() > 0.5
+
+
+def test_the_kernel_draws_what_the_slow_way_draws() -> None:
+    chance = np.random.default_rng(8)
+    mean = chance.uniform(-5.0, 80.0, (40, 70)).astype(np.float32)
+    bits = chance.integers(0, 2**32, mean.shape, np.uint32)
+    bits[:5] |= np.uint32(0xFFFF0000)
+    main, tail = Law("weibull", 1.4).quantiles
+    made = np.empty(mean.shape, np.uint8)
+    _draw(mean, bits, main, tail, np.float32(3.2), made)
+    place = bits >> 16
+    value = np.where(place == 65535, tail[bits & 65535], main[place])
+    np.testing.assert_array_equal(made, np.clip(np.rint((mean + value) * np.float32(3.2)), 0, 255))
 
 
 def test_speckle_of_a_beam_is_correlated_in_azimuth_with_the_same_law() -> None:
