@@ -20,7 +20,7 @@ from pipeline.detect.checks import check_pfa, check_positive, check_start, check
 from pipeline.detect.hybrid_map import HybridMapState, detect_in_map_cells
 from pipeline.detect.limits import limits_used
 from pipeline.detect.macro_cells import STRIPE_ROWS, MacroCells, MapCells
-from pipeline.kernels.bits import add_pairs, bits_above, borrowed, count_runs
+from pipeline.kernels.bits import add_pairs, bits_above, borrowed, compare_and_add_four, count_runs
 from pipeline.kernels.run_cap import CapSettings, fit_row, grow_row
 from pipeline.state import ArrayState, StateError, read_only, remembered
 from pipeline.tables import Detections, Sweeps, VideoFormat
@@ -30,11 +30,16 @@ Cells = Literal["square", "map"]
 PAIR_ROWS = 128
 """Rows whose sums of two bytes fit 16 bits."""
 
+STRIPE, SWEPT, SCAN, LEFT, DRAINED = 0, 1, 2, 3, 4
+"""The cursor: stripe being swept, sweeps of the scan taken up, scan, macro-cells of the turn left behind, sweeps until
+the sums of pairs were last added up."""
+
 
 @dataclass(eq=False, kw_only=True)
 class HybridState(ArrayState):
-    """level, weight: log mean in steps and scans behind it, of each macro-cell. The rest is the macro-cells being
-    swept; threshold and growth: limits of each cell of the row."""
+    """level, weight: log mean in steps and scans behind it, of each macro-cell. threshold and growth: limits of each
+    cell of the row. ring_since: sweeps of the scan before each ring's macro-cell; ring_sums, pair_sums: amplitudes of
+    the sweeps since, of all cells and, newest, by pairs. cursor: see STRIPE."""
 
     cells: MacroCells
     azimuths: int
@@ -49,17 +54,15 @@ class HybridState(ArrayState):
     growth: NDArray[np.uint8] = remembered()
     pair_sums: NDArray[np.uint16] = remembered()
     ring_sums: NDArray[np.int64] = remembered()
-    ring_rows: NDArray[np.int64] = remembered()
-    ring_pending: NDArray[np.int64] = remembered()
-    ring_cell: NDArray[np.uint64] = remembered()
+    ring_since: NDArray[np.int64] = remembered()
     cursor: NDArray[np.int64] = remembered()
     budget: NDArray[np.float64] = remembered()
     degraded_sweeps: NDArray[np.int64] = remembered()
 
     def refuse_untrue(self, saved: Mapping[str, NDArray[Any]]) -> None:
-        """Raise StateError when a ring's macro-cell does not exist."""
-        if (saved["ring_cell"] >= np.uint64(len(self.level))).any():
-            raise StateError("ring_cell: a macro-cell that does not exist")
+        """Raise StateError when the macro-cell that is left next does not exist."""
+        if not 0 <= saved["cursor"][LEFT] < len(self.level):
+            raise StateError("cursor: a macro-cell that does not exist")
 
     @property
     def counters(self) -> dict[str, int]:
@@ -127,10 +130,8 @@ class Hybrid:
             weight=np.zeros(many),
             pair_sums=np.zeros(32 * video.words, np.uint16),
             ring_sums=np.zeros(rings, np.int64),
-            ring_rows=np.zeros(rings, np.int64),
-            ring_pending=np.zeros(rings, np.int64),
-            ring_cell=cells.first.copy(),
-            cursor=np.array([-1, 0, -1], np.int64),
+            ring_since=np.zeros(rings, np.int64),
+            cursor=np.array([-1, 0, -1, 0, 0], np.int64),
         )
 
     def __call__(self, sweeps: Sweeps, state: HybridState | HybridMapState) -> Detections:
@@ -155,7 +156,7 @@ class Hybrid:
             _detect(
                 *block,
                 cells.stripe_rows,
-                (cells.groups, cells.first, cells.until, cells.cells, cells.rows),
+                (cells.groups, cells.turn, cells.cells, cells.rows),
                 rule,
                 (cap.refill, cap.depth),
                 (
@@ -165,13 +166,7 @@ class Hybrid:
                     state.pair_sums.view(np.uint64),
                     state.growth.view(np.uint64),
                 ),
-                (
-                    state.ring_sums,
-                    state.ring_rows,
-                    state.ring_pending,
-                    state.ring_cell,
-                    state.cursor,
-                ),
+                (state.ring_sums, state.ring_since, state.cursor),
                 (state.budget, state.degraded_sweeps),
                 state.tail,
             )
@@ -206,17 +201,11 @@ def _detect(
     amplitude, rows, tail = borrowed(amplitude), borrowed(rows), borrowed(tail)
     mask, grown = borrowed(masks[0]), borrowed(masks[1])
     threshold, pair_sums, growth = borrowed(memory[2]), borrowed(memory[3]), borrowed(memory[4])
-    cursor = borrowed(swept[4])
+    cursor = borrowed(swept[2])
     budget, degraded = borrowed(flood[0]), borrowed(flood[1])
     memory = (borrowed(memory[0]), borrowed(memory[1]), threshold, pair_sums, growth)
-    swept = (borrowed(swept[0]), borrowed(swept[1]), borrowed(swept[2]), borrowed(swept[3]), cursor)
-    layout = (
-        borrowed(layout[0]),
-        borrowed(layout[1]),
-        borrowed(layout[2]),
-        borrowed(layout[3]),
-        borrowed(layout[4]),
-    )
+    swept = (borrowed(swept[0]), borrowed(swept[1]), cursor)
+    layout = (borrowed(layout[0]), borrowed(layout[1]), borrowed(layout[2]), borrowed(layout[3]))
     n, ranges = amplitude.shape
     whole = ranges // 64
     rest = ranges - 64 * whole
@@ -226,94 +215,122 @@ def _detect(
         pair_sums.ctypes.data,
         tail.ctypes.data,
     )
-    for i in range(n):
+    mask_at, words = mask.ctypes.data, mask.shape[1]
+    left = budget[0]
+    i = 0
+    while i < n:
         stripe = rows[i] // stripe_rows
-        if stripe != cursor[0] or scan != cursor[2]:
+        if stripe != cursor[STRIPE] or scan != cursor[SCAN]:
             _next_stripe(stripe, scan, layout, rule, memory, swept)
-        cursor[1] += 1
-        bits = mask[i]
-        row_at = cells_at + np.uintp(i) * np.uintp(ranges)
-        anything = np.uint64(0)
-        for w in range(whole):
-            at = np.uintp(64 * w)
-            word = bits_above(row_at + at, limits_at + at)
-            add_pairs(row_at + at, sums_at + at)
-            bits[w] = word
-            anything |= word
-        if rest:
-            cells = amplitude[i]
-            for j in range(rest):
-                tail[j] = cells[64 * whole + j]
-            at = np.uintp(64 * whole)
-            word = bits_above(tail_at, limits_at + at)
-            add_pairs(tail_at, sums_at + at)
-            bits[whole] = word
-            anything |= word
-        budget[0] = min(budget[0] + refill, depth)
-        if anything:
+        end = i + 1
+        while end < n and rows[end] < (stripe + 1) * stripe_rows:
+            end += 1
+        cursor[SWEPT] += end - i
+        k = i
+        while k + 4 <= end:
+            row_at, bits_at = cells_at + np.uintp(k) * np.uintp(ranges), mask_at + np.uintp(k) * np.uintp(8 * words)
+            for w in range(whole):
+                at = np.uintp(64 * w)
+                compare_and_add_four(
+                    row_at + at,
+                    np.uintp(ranges),
+                    limits_at + at,
+                    sums_at + at,
+                    bits_at + np.uintp(8 * w),
+                    np.uintp(8 * words),
+                )
+            k += 4
+        while k < end:
+            row_at, bits = cells_at + np.uintp(k) * np.uintp(ranges), mask[k]
+            for w in range(whole):
+                at = np.uintp(64 * w)
+                bits[w] = bits_above(row_at + at, limits_at + at)
+                add_pairs(row_at + at, sums_at + at)
+            k += 1
+        for k in range(i, end):
+            cells, bits = amplitude[k], mask[k]
+            if rest:
+                for j in range(rest):
+                    tail[j] = cells[64 * whole + j]
+                at = np.uintp(64 * whole)
+                bits[whole] = bits_above(tail_at, limits_at + at)
+                add_pairs(tail_at, sums_at + at)
+            left = min(left + refill, depth)
             runs = count_runs(bits)
-            if runs <= budget[0]:
-                budget[0] -= runs
-            else:
+            raised = runs > left
+            if raised:
                 degraded[0] += 1
-                fit_row(amplitude[i], limits_at, bits, budget, tail)
-                if grows:
-                    for w in range(bits.size):
-                        grown[i, w] = bits[w]
-                continue
-        if grows:
-            grow_row(amplitude[i], growth.ctypes.data, bits, grown[i], tail)
+                budget[0] = left
+                fit_row(cells, limits_at, bits, budget, tail)
+                left = budget[0]
+            else:
+                left -= runs
+            if grows and raised:
+                grown[k, :] = bits
+            elif grows:
+                grow_row(cells, growth.ctypes.data, bits, grown[k], tail)
+        i = end
+    budget[0] = left
 
 
 @njit(nogil=True, cache=True)
 def _next_stripe(stripe: int, scan: int, layout: Any, rule: Any, memory: Any, swept: Any) -> None:
     # One function with plain loops over eight bytes at a time: a call that hands on arrays, or a loop whose length the
     # compiler does not know, costs more here than the work itself.
-    groups, first_cell, until, full_cells, full_rows = layout
+    groups, turn, full_cells, full_rows = layout
     mu, loss, most, learn, grow, grows = rule
     level, weight, threshold, pair_sums, growth = memory
-    sums, rows, pending, current, cursor = swept
-    new_scan = scan != cursor[2]
-    even = np.uint64(0x0000FFFF0000FFFF)
-    for k in range(first_cell.size):
-        pending[k] += cursor[1]
-        old = current[k]
-        leaves = new_scan or stripe >= until[old]
-        if not leaves and pending[k] <= PAIR_ROWS - STRIPE_ROWS:
-            continue
+    sums, since, cursor = swept
+    until, leaving, ring, after = turn[0], turn[1], turn[2], turn[3]
+    new_scan = scan != cursor[SCAN]
+    now = np.uint64(stripe)
+    count = cursor[SWEPT]
+    even, one = np.uint64(0x0000FFFF0000FFFF), np.uint64(1)
+    event, many = np.uint64(cursor[LEFT]), np.uint64(leaving.size)
+    while new_scan or until[event] <= now:
+        old, new, k = leaving[event], after[event], ring[event]
         low, high = np.uint64(0), np.uint64(0)
-        for g in range(groups[k], groups[k + 1]):
+        for g in range(groups[k], groups[k + one]):
             four = pair_sums[g]
             low += four & even
             high += (four >> np.uint64(16)) & even
             pair_sums[g] = 0
         low += high
-        sums[k] += np.int64((low & np.uint64(0xFFFFFFFF)) + (low >> np.uint64(32)))
-        rows[k] += pending[k]
-        pending[k] = 0
-        if not leaves:
-            continue
-        if rows[k] > 0:
-            share = rows[k] / full_rows[old]
+        rows = count - since[k]
+        if rows > 0:
+            total = sums[k] + np.int64((low & np.uint64(0xFFFFFFFF)) + (low >> np.uint64(32)))
+            share = rows / full_rows[old]
             weight[old] = min(weight[old] + share, most)
-            level[old] += (sums[k] / (share * full_cells[old]) - level[old]) * share / weight[old]
+            level[old] += (total / (share * full_cells[old]) - level[old]) * share / weight[old]
         sums[k] = 0
-        rows[k] = 0
-        new = first_cell[k] if new_scan else old
-        while stripe >= until[new]:
-            new += np.uint64(1)
-        current[k] = new
+        since[k] = count
         limit = 255.0
         if weight[new] >= learn:
             limit = min(np.floor(level[new] + mu + loss / (weight[new] * full_cells[new]) + 0.5), 255.0)
         eight = np.uint64(limit) * np.uint64(0x0101010101010101)
-        for g in range(groups[k], groups[k + 1]):
+        for g in range(groups[k], groups[k + one]):
             threshold[g] = eight
         if grows:
             lower = min(np.floor(level[new] + grow + 0.5), limit) if weight[new] >= learn else limit
             eight = np.uint64(lower) * np.uint64(0x0101010101010101)
-            for g in range(groups[k], groups[k + 1]):
+            for g in range(groups[k], groups[k + one]):
                 growth[g] = eight
-    cursor[0] = stripe
-    cursor[1] = 0
-    cursor[2] = scan
+        event += one
+        if event == many:
+            new_scan = False
+            event = np.uint64(0)
+            count = np.int64(0)
+            cursor[DRAINED] = 0
+            since[:] = 0
+    if count - cursor[DRAINED] > PAIR_ROWS - STRIPE_ROWS:
+        for r in range(since.size):
+            for g in range(groups[r], groups[r + 1]):
+                four = pair_sums[g]
+                pairs = (four & even) + ((four >> np.uint64(16)) & even)
+                sums[r] += np.int64((pairs & np.uint64(0xFFFFFFFF)) + (pairs >> np.uint64(32)))
+                pair_sums[g] = 0
+        cursor[DRAINED] = count
+    cursor[STRIPE] = stripe
+    cursor[SWEPT] = count
+    cursor[SCAN] = scan
+    cursor[LEFT] = event

@@ -23,7 +23,8 @@ class MacroCells:
 
     groups: (rings + 1) first group of each ring. first: (rings) index of each ring's macro-cell at north; clockwise
     from there they are counted on. until: (cells) stripe after each macro-cell's last. rows, cells: (cells) azimuth
-    rows and radar cells.
+    rows and radar cells. turn: (4, cells) the macro-cells in the order in which the antenna leaves them: stripe after
+    their last, number, ring, and number of the next in the ring.
     """
 
     stripe_rows: int
@@ -32,6 +33,7 @@ class MacroCells:
     until: NDArray[np.int64]
     rows: NDArray[np.float64]
     cells: NDArray[np.float64]
+    turn: NDArray[np.uint64]
 
     @classmethod
     def build(cls, video: VideoFormat, size_m: float) -> MacroCells:
@@ -48,13 +50,18 @@ class MacroCells:
         bands = np.clip(np.rint(wanted), 1, stripes).astype(np.int64)
         until = [(np.arange(n) + 1) * stripes // n for n in bands]
         rows = [np.diff(np.minimum(one * stripe_rows, video.azimuths), prepend=0) for one in until]
+        first = np.concatenate([[0], np.cumsum(bands)[:-1]])
+        after = np.arange(bands.sum()) + 1
+        after[first + bands - 1] = first
+        turn = np.stack([np.concatenate(until), np.arange(bands.sum()), np.repeat(np.arange(rings), bands), after])
         return cls(
             stripe_rows,
             groups.astype(np.uint64),
-            np.concatenate([[0], np.cumsum(bands)[:-1]]).astype(np.uint64),
+            first.astype(np.uint64),
             np.concatenate(until).astype(np.int64),
             np.concatenate(rows).astype(np.float64),
             np.concatenate([one * w for one, w in zip(rows, np.diff(edges), strict=True)]).astype(np.float64),
+            turn[:, np.lexsort([turn[2], turn[0]])].astype(np.uint64),
         )
 
     def labels(self, video: VideoFormat) -> NDArray[np.int64]:

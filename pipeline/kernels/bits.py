@@ -16,6 +16,7 @@ from numba.core import cgutils
 _BYTES = ir.VectorType(ir.IntType(8), 64)
 intrinsic: Any = extending.intrinsic
 _PAIRS = ir.VectorType(ir.IntType(16), 32)
+_declared: Any = cgutils.get_or_insert_function
 
 
 def _load(builder: Any, address: Any, kind: ir.Type) -> Any:
@@ -81,6 +82,42 @@ def add_pairs(typing: Any, cells: Any, sums: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(types.uintp, types.uintp), build
+
+
+@intrinsic
+def compare_and_add_four(
+    typing: Any, cells: Any, cells_step: Any, limits: Any, sums: Any, bits: Any, bits_step: Any
+) -> Any:
+    """`bits_above` and `add_pairs` for the same 64 cells of four rows: the limits and sums are taken up once.
+
+    The rows' cells lie cells_step bytes apart, the words for their bits bits_step bytes. Adds up to four times 510 to
+    the sums.
+    """
+
+    def build(context: Any, builder: Any, signature: Any, words: Any) -> Any:
+        cells, cells_step, limits, sums, bits, bits_step = words
+        limit = _load(builder, limits, _BYTES)
+        rows, at = [], cells
+        for _ in range(4):
+            rows.append(_load(builder, at, _PAIRS))
+            at = builder.add(at, cells_step)
+        # low + high of every pair is pair - 255 * high, in 16 bits whatever the sum of the pairs runs over to
+        eight = ir.Constant(_PAIRS, [8] * 32)
+        highs = [builder.lshr(one, eight) for one in rows]
+        pairs, high = (
+            builder.add(builder.add(four[0], four[1]), builder.add(four[2], four[3])) for four in (rows, highs)
+        )
+        total = builder.sub(builder.add(pairs, high), builder.shl(high, eight))
+        total = builder.add(_load(builder, sums, _PAIRS), total)
+        builder.store(total, builder.inttoptr(sums, _PAIRS.as_pointer()), align=2)
+        word = ir.IntType(64)
+        for one in rows:
+            above = builder.icmp_unsigned(">", builder.bitcast(one, _BYTES), limit)
+            builder.store(builder.bitcast(above, word), builder.inttoptr(bits, word.as_pointer()), align=8)
+            bits = builder.add(bits, bits_step)
+        return context.get_dummy_value()
+
+    return types.void(*[types.uintp] * 6), build
 
 
 @intrinsic
@@ -164,8 +201,7 @@ def fetch_ahead(typing: Any, address: Any) -> Any:
     def build(context: Any, builder: Any, signature: Any, words: Any) -> Any:
         pointer, number = ir.IntType(8).as_pointer(), ir.IntType(32)
         kind = ir.FunctionType(ir.VoidType(), [pointer, number, number, number])
-        insert: Any = cgutils.get_or_insert_function
-        fetch = insert(builder.module, kind, "llvm.prefetch.p0i8")
+        fetch = _declared(builder.module, kind, "llvm.prefetch.p0i8")
         read, keep, data = (ir.Constant(number, one) for one in (0, 3, 1))
         builder.call(fetch, [builder.inttoptr(words[0], pointer), read, keep, data])
         return context.get_dummy_value()
@@ -173,14 +209,37 @@ def fetch_ahead(typing: Any, address: Any) -> Any:
     return types.void(types.uintp), build
 
 
+@intrinsic
+def runs_in_eight(typing: Any, bits: Any, before: Any) -> Any:
+    """How many runs of set bits begin in the eight words at address `bits`, `before` being the word before them."""
+
+    def build(context: Any, builder: Any, signature: Any, words: Any) -> Any:
+        kind = ir.VectorType(ir.IntType(64), 8)
+        one, top = ir.Constant(kind, [1] * 8), ir.Constant(kind, [63] * 8)
+        here = _load(builder, words[0], kind)
+        first = builder.insert_element(ir.Constant(kind, ir.Undefined), words[1], ir.Constant(ir.IntType(32), 0))
+        back = builder.shuffle_vector(first, here, ir.Constant(ir.VectorType(ir.IntType(32), 8), [0, *range(8, 15)]))
+        inside = builder.or_(builder.shl(here, one), builder.lshr(back, top))
+        starts = builder.and_(here, builder.not_(inside))
+        count = _declared(builder.module, ir.FunctionType(kind, [kind]), "llvm.ctpop.v8i64")
+        total = _declared(builder.module, ir.FunctionType(ir.IntType(64), [kind]), "llvm.vector.reduce.add.v8i64")
+        return builder.call(total, [builder.call(count, [starts])])
+
+    return types.uint64(types.uintp, types.uint64), build
+
+
 @njit(nogil=True, cache=True)
 def count_runs(mask: Any) -> Any:
     """Number of runs of set bits in one row of words."""
     runs = types.uint64(0)  # with a signed 0 numba would count in floating point
-    carry = types.uint64(0)
+    before = types.uint64(0)
     one = types.uint64(1)
-    for w in range(mask.size):
+    whole = mask.size // 8
+    for eight in range(whole):
+        runs += runs_in_eight(mask.ctypes.data + np.uintp(64 * eight), before)
+        before = mask[np.uintp(8 * eight + 7)]
+    for w in range(8 * whole, mask.size):
         word = mask[w]
-        runs += set_bits(word & ~((word << one) | carry))
-        carry = word >> types.uint64(63)
+        runs += set_bits(word & ~((word << one) | (before >> types.uint64(63))))
+        before = word
     return types.int64(runs)

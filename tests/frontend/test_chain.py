@@ -205,7 +205,7 @@ def test_what_cannot_be_resumed_is_refused_and_changes_nothing() -> None:
         ({**kept, "chain.rows": np.array([1, 2])}, "chain.rows"),
         ({**kept, "chain.rows": np.array([2**60, 0, 0])}, "cannot be true"),
         ({**kept, "chain.rows": np.array(["a", "b", "c"])}, "chain.rows"),
-        ({**kept, "detect.ring_cell": kept["detect.ring_cell"] + 10**6}, "macro-cell"),
+        ({**kept, "detect.cursor": kept["detect.cursor"] + 10**6}, "macro-cell"),
         ({**kept, "detect.level": kept["detect.level"].astype(np.float32)}, "level"),
         ({}, "chain.rows"),
     ):
