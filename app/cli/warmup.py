@@ -17,10 +17,12 @@ def warmup() -> None:
     from rich.console import Console
 
     from app.airports import load_airport
+    from app.assembly import FRONT_END, build_parts, chain_of
     from app.demo import demo_settings
     from app.demo import warm as warm_simulator
     from app.service import SurfaceService
     from app.settings import load
+    from pipeline import parts
 
     console = Console()
     begun = time.perf_counter()
@@ -28,6 +30,11 @@ def warmup() -> None:
     service = SurfaceService(settings, *load_airport(settings.airport))
     with console.status("compiling the kernels of the chain and the tracker"):
         service.prepare(resume=False)
+    with console.status("compiling the kernels of the other parts of a radar"):
+        for verb in FRONT_END:
+            for name in parts.available(verb):
+                made = {**build_parts(settings, FRONT_END), verb: parts.build(verb, name)}
+                chain_of(service.radars[0], 0, made, None).warm()
     with console.status("compiling the kernels of the simulator"):
         warm_simulator()
     console.print(f"every kernel is compiled ({time.perf_counter() - begun:.1f} s)")

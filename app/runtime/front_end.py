@@ -6,7 +6,7 @@ import difflib
 import logging
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import TimeoutError as NoAnswer
 from typing import Any
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from app.assembly import FRONT_END, chain_of, parts_of
 from app.contract import FrontEnd, Refused, WrongParts
+from app.runtime.compile_apart import compile_apart
 from app.runtime.radar_worker import RadarWorker
 from pipeline import catalogue, parts
 from pipeline.chain import RadarChain
@@ -31,13 +32,21 @@ ANSWER_S = 2.0
 class FrontEndSwitch:
     """One radar's parts: what runs, what learns to take over, and how to change it. Any thread may call.
 
-    index: the radar's place in the engine. surface: what `RadarChain` takes.
+    index: the radar's place in the engine. surface: what `RadarChain` takes. compile: called with parts before they are
+    built, so that their kernels lie in the cache.
     """
 
-    def __init__(self, worker: RadarWorker, index: int, surface: NDArray[np.uint8] | None) -> None:
+    def __init__(
+        self,
+        worker: RadarWorker,
+        index: int,
+        surface: NDArray[np.uint8] | None,
+        compile: Callable[[Mapping[str, Mapping[str, Any]]], None] = compile_apart,
+    ) -> None:
         self._worker = worker
         self._index = index
         self._surface = surface
+        self._compile = compile
         self._next: dict[str, Any] | None = None
         self._changing = threading.Lock()
 
@@ -103,6 +112,7 @@ class FrontEndSwitch:
 
     def _compiled(self, made: dict[str, Any]) -> RadarChain:
         try:
+            self._compile(_described(made))
             chain = chain_of(self._worker.site, self._index, made, self._surface, time.perf_counter)
             chain.warm()
         except (ValueError, MemoryError, OverflowError) as error:

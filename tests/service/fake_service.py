@@ -75,7 +75,7 @@ def parts_on(site: RadarSite, index: int) -> FrontEndSwitch:
     chain = chain_of(site, index, build_parts(Settings(), FRONT_END), None)
     worker = RadarWorker(site, chain, 4, lambda _: True)
     worker.turn = Turn(7, 214, {"keep": 0.0012, "detect": 0.0184, "extract": 0.0031})
-    return FrontEndSwitch(worker, index, None)
+    return FrontEndSwitch(worker, index, None, compile=lambda _: None)
 
 
 class FakeService:
