@@ -59,7 +59,7 @@ def node_site(node: NodeSettings, airport: Airport) -> NodeSite:
     )
 
 
-FRONT_END = {"detect": "detector", "extract": "extractor"}
+FRONT_END = {"detect": "detector", "extract": "extractor", "bearing": "bearing"}
 """The verbs whose parts work on one radar's video, and what `RadarChain` calls the part."""
 
 

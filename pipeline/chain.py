@@ -3,25 +3,33 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from pipeline.bearing import BearingEstimator
+from pipeline.bearing.of_plots import Expectations, PlotBearings
 from pipeline.detect import Detector
 from pipeline.extract import Extractor
+from pipeline.kernels.scan_convert import plot_images
 from pipeline.sites import RadarSite
 from pipeline.state import StateError
 from pipeline.tables import Detections, Plots, SectorPlots, Sweeps, TableError, VideoFormat
 
+PIECES = 8
+"""A block is worked on in pieces of at most this part of a turn."""
+
 
 class RadarChain:
-    """Detection and extraction of one radar, block after block.
+    """Detection, extraction and bearings of one radar, block after block.
 
-    site: the radar. index: its place in the engine, written into every plot. detector, extractor: parts of
-    `pipeline.detect` and `pipeline.extract`. surface: (azimuths, ranges) uint8 kind of surface of each cell, for
+    site: the radar. index: its place in the engine, written into every plot. detector, extractor, bearing: parts of
+    `pipeline.detect`, `pipeline.extract` and `pipeline.bearing`; without the last, plots have the axis of their cells.
+    surface: (azimuths, ranges) uint8 kind of surface of each cell, for
     detectors that use it. clock: seconds of any steady clock; with it `timings` holds the seconds of each stage for the
     newest block. newest: (azimuths, ranges) uint8, the newest turn for displays, written in place; rows that were not
     received are 0.
@@ -35,17 +43,20 @@ class RadarChain:
         extractor: Extractor,
         surface: NDArray[np.uint8] | None = None,
         clock: Callable[[], float] | None = None,
+        bearing: BearingEstimator | None = None,
     ) -> None:
         self.site = site
         self.index = index
         self.detector = detector
         self.extractor = extractor
+        self.bearing = bearing
         self.newest: NDArray[np.uint8] = np.zeros((site.video.azimuths, site.video.ranges), np.uint8)
         self.time = float("nan")
         self.timings: dict[str, float] = {}
         self._clock = clock
         self._detecting = detector.start(site.video, surface, growth_db=getattr(extractor, "growth_db", None))
         self._extracting = extractor.start(site)
+        self._bearings = None if bearing is None else PlotBearings(site, bearing)
         self._surface = "none" if surface is None else f"{zlib.crc32(np.ascontiguousarray(surface).tobytes()):08x}"
         self._next_row = -1
         self._closed_to = -1
@@ -72,19 +83,46 @@ class RadarChain:
         if not len(fresh):
             return self._sector(block.scan, Plots.empty(), degraded=False)
         self._count(fresh)
-        self._timed("keep", self._keep, fresh)
-        found: Detections = self._timed("detect", self.detector, self._numbered(fresh), self._detecting)
-        plots: Plots = self._timed("extract", self.extractor, fresh, found, self._extracting)
+        spent: dict[str, float] = {}
+        made, degraded = [], False
+        for piece in _pieces(fresh, self.site.video.azimuths // PIECES):
+            self._timed(spent, "keep", self._keep, piece)
+            found: Detections = self._timed(spent, "detect", self.detector, self._numbered(piece), self._detecting)
+            plots: Plots = self._timed(spent, "extract", self.extractor, piece, found, self._extracting)
+            if self._bearings is not None:
+                plots = self._timed(spent, "bearing", self._bearings, plots, self.newest)
+            made.append(plots)
+            degraded |= found.degraded
+        self.timings = spent
         self.time = float(fresh.time[-1])
+        plots = made[0] if len(made) == 1 else Plots.concatenate(made)
         self._counts["plots"] += len(plots)
-        self._counts["degraded_blocks"] += found.degraded
-        return self._sector(block.scan, plots, found.degraded)
+        self._counts["degraded_blocks"] += degraded
+        return self._sector(block.scan, plots, degraded)
 
     def flush(self) -> SectorPlots:
         """Deliver the plots that are still open, as at the end of a recording."""
         plots = self.extractor.flush(self._extracting)
+        if self._bearings is not None:
+            plots = self._bearings(plots, self.newest)
         self._counts["plots"] += len(plots)
         return self._sector(max(0, self._next_row - 1) // self.site.video.azimuths, plots, degraded=False)
+
+    def expect(self, east: ArrayLike, north: ArrayLike, heading: ArrayLike, sd: ArrayLike) -> None:
+        """What tracks expect from now on, one value a track: where they are (m from the airport's reference point) and
+        how they point (rad from true north, standard deviation rad); plots near such a place take it for their bearing.
+
+        Replaces what was expected before; any thread may call it. Without it bearings depend on the video only. Raises
+        ValueError for columns of different lengths.
+        """
+        if self._bearings is not None:
+            self._bearings.expected = Expectations.of(east, north, heading, sd)
+
+    def images(self, plots: Plots, *, step_m: float = 1.5, size: int = 64) -> NDArray[np.uint8]:
+        """(n, size, size) mean log amplitude of the ground about each plot, north up, east to the right, `step_m`
+        metres a pixel; 0 outside the video. For plots just delivered: the picture is of the newest turn. Raises
+        ValueError for an image without pixels."""
+        return plot_images(plots, self.newest, self.site, step=step_m, size=size)
 
     def save(self) -> dict[str, NDArray[Any]]:
         """Everything that must survive a restart, as arrays by name (fit for `numpy.savez`); the picture is not in
@@ -165,7 +203,8 @@ class RadarChain:
     def warm(self) -> None:
         """Compile everything (or load it from the cache) on a tiny radar, leaving this chain's state alone."""
         video = VideoFormat(azimuths=64, ranges=80, period_s=1.0, db_per_step=self.site.video.db_per_step)
-        tiny = RadarChain(replace(self.site, video=video), self.index, self.detector, self.extractor)
+        there = replace(self.site, video=video, height=0.0)
+        tiny = RadarChain(there, self.index, self.detector, self.extractor, bearing=self.bearing)
         rng = np.random.default_rng(0)
         row = np.arange(64, dtype=np.int32)
         for scan in range(3):
@@ -176,7 +215,8 @@ class RadarChain:
         tiny.flush()
 
     def _own_counters(self) -> dict[str, int]:
-        return {**self._counts, **self._detecting.counters, **self._extracting.counters}
+        bearings = {} if self._bearings is None else self._bearings.counters
+        return {**self._counts, **self._detecting.counters, **self._extracting.counters, **bearings}
 
     def _carry(self, counted: Mapping[str, int]) -> None:
         """Let the counters go on from these."""
@@ -262,13 +302,31 @@ class RadarChain:
             degraded=degraded,
         )
 
-    def _timed(self, stage: str, work: Callable[..., Any], *words: Any) -> Any:
+    def _timed(self, spent: dict[str, float], stage: str, work: Callable[..., Any], *words: Any) -> Any:
         if self._clock is None:
             return work(*words)
         begin = self._clock()
         result = work(*words)
-        self.timings[stage] = self._clock() - begin
+        spent[stage] = spent.get(stage, 0.0) + self._clock() - begin
         return result
+
+
+def _pieces(block: Sweeps, most: int) -> Iterator[Sweeps]:
+    """The block cut so that the newest turn still shows the sweeps of a plot when that is complete."""
+    if not block.row[-1] - block.row[0] >= most > 0:
+        yield block
+        return
+    edges = np.searchsorted(block.row, np.arange(block.row[0], block.row[-1] + most, most))
+    cuts = [int(one) for one in np.unique(np.append(edges, len(block)))]
+    for a, b in pairwise(cuts):
+        yield replace(
+            block,
+            row=block.row[a:b],
+            azimuth=block.azimuth[a:b],
+            time=block.time[a:b],
+            amplitude=block.amplitude[a:b],
+            last=block.last and b == len(block),
+        )
 
 
 def _under(prefix: str, saved: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:

@@ -65,7 +65,7 @@ class Hough:
         image = scan_converted(view.amplitude, grid, place, step=self.step_m, size=PIXELS, outside=echo.background)
         above = image - np.float32(echo.background)
         votes = np.where(above > contrast, above if self.weighted else np.float32(1.0), np.float32(0.0))
-        lines = hough(votes, self.angles, self.line_m / self.step_m)
+        lines = hough(votes, self.angles, self.line_m / self.step_m, ((PIXELS - 1) / 2,) * 2)
         # columns run east and rows south: a normal at `angle` from east to south is a line at `angle` from north
         return [angle for angle, _ in peaks(lines, many, math.radians(20))]
 

@@ -20,7 +20,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.bearing import NO_BEARING, Bearing, Expected, TargetView
-from pipeline.bearing.sense import tells_the_nose
+from pipeline.bearing.sense import pointed
 from pipeline.kernels.correlate import belief, decibels, fit
 from pipeline.kernels.echo import measured
 from pipeline.kernels.planform import Planform, Templates, templates
@@ -129,20 +129,16 @@ class MaximumLikelihood:
         return self._judged(modes, expected)
 
     def _judged(self, modes: Floats, expected: Expected | None) -> Bearing:
-        """The likeliest heading; the others count in its uncertainty by their distance and weight."""
+        """The likeliest axis; the others count in its uncertainty by their distance and weight."""
         best = int(np.argmax(modes[:, 1]))
         bearing, top, variance = modes[best]
         if not (math.isfinite(top) and variance > 0):
             return NO_BEARING
-        known = tells_the_nose(expected)
-        around = 2 * math.pi if known else math.pi
-        away = np.abs(np.mod(modes[:, 0] - bearing + around / 2, around) - around / 2)
+        away = np.abs(np.mod(modes[:, 0] - bearing + math.pi / 2, math.pi) - math.pi / 2)
         weight = np.exp(OTHER_AXES * (modes[:, 1] - top))
         spread = float(weight @ away**2) / float(weight.sum())
         sd = math.sqrt(variance + spread + math.radians(self.floor_deg) ** 2)
-        if not sd <= math.radians(self.limit_deg):
-            return NO_BEARING
-        return Bearing(float(bearing % around), sd, nose_known=known)
+        return pointed(float(bearing), sd, expected, math.radians(self.limit_deg))
 
 
 @lru_cache(maxsize=8)

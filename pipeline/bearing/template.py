@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.bearing import NO_BEARING, Bearing, Expected, TargetView
-from pipeline.bearing.sense import tells_the_nose
+from pipeline.bearing.sense import pointed
 from pipeline.bearing.type_bank import AIRCRAFT, ANGLES, TypeBank, check
 from pipeline.kernels.correlate import belief
 from pipeline.kernels.echo import measured
@@ -68,18 +68,14 @@ class Template:
             prior = (expected.heading, max(expected.sd, 1e-3), self.outliers)
             likely = likely + np.array([belief(one, prior) for one in heading])
         kind, best = np.unravel_index(int(np.argmax(likely)), likely.shape)
-        known = tells_the_nose(expected)
-        around = TURN if known else math.pi
-        away = (heading - heading[best] + around / 2) % around - around / 2
+        away = (heading - heading[best] + math.pi / 2) % math.pi - math.pi / 2
         weight = np.exp(likely - likely.max()).sum(axis=0)
         weight /= weight.sum()
         # the mean near the best: finer than the templates
         near = np.abs(away) < math.radians(6)
         off = float(weight[near] @ away[near]) / float(weight[near].sum())
         sd = math.sqrt(float(weight @ (away - off) ** 2) + math.radians(self.floor_deg) ** 2)
-        if not sd <= math.radians(self.limit_deg):
-            return NO_BEARING
-        return Bearing(float((heading[best] + off) % around), sd, nose_known=known, type=self.types[int(kind)])
+        return pointed(float(heading[best]) + off, sd, expected, math.radians(self.limit_deg), self.types[int(kind)])
 
 
 PART = Template

@@ -59,7 +59,8 @@ def measured(
     *,
     weighted: bool = False,
 ) -> Echo | None:
-    """The echo in the plot's window (first row, rows, first cell, cells); None when nothing stands out.
+    """The echo in the plot's window (first row, rows, first cell, cells); None when nothing stands out, or
+    no ground is shown about it to stand out of.
 
     contrast: amplitude steps over the median of the ground from which on a cell belongs to the echo. weighted: by the
     steps above the ground. Rows without any amplitude were not received and tell nothing of the ground.
@@ -91,26 +92,31 @@ def _median(histogram: Any, total: int) -> Any:
 def _ground(amplitude: Any, window: Any) -> Any:
     top, bottom, near, far = window
     histogram = np.zeros(256, np.int64)
-    total = 0
+    total = seen = 0
     for i in range(amplitude.shape[0]):
         row = amplitude[i]
         received = False
         for j in range(row.size):
             received = received or row[j] > 0
+        inside = top <= i < bottom
+        seen += row.size - (far - near if inside else 0)
         if not received:
             continue
-        inside = top <= i < bottom
         for j in range(row.size):
             if not (inside and near <= j < far):
                 histogram[row[j]] += 1
                 total += 1
-    return _median(histogram, total) if total else 0.0
+    if total:
+        return _median(histogram, total)
+    return 0.0 if seen else np.nan
 
 
 @njit(nogil=True, cache=True)
 def _measure(amplitude: Any, window: Any, grid: Any, beam: float, contrast: float, weighted: bool, out: Any) -> bool:
     first_azimuth, azimuth_step, first_range, range_step, height = grid
     background = _ground(amplitude, window)
+    if np.isnan(background):
+        return False
     limit = background + contrast
     count = 0
     total = sx = sy = sxx = sxy = syy = 0.0

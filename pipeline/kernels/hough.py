@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-def hough(weights: NDArray[np.float32], angles: int, width: float) -> Floats:
+def hough(weights: NDArray[np.float32], angles: int, width: float, origin: tuple[float, float] = (0.0, 0.0)) -> Floats:
     """(angles, bins) what lies on each line: the normal of lines of row k points pi k / angles from the direction of
-    the columns to that of the rows; a line is `width` pixels wide. weights: (n, m), 0 where there is nothing."""
+    the columns to that of the rows; a line is `width` pixels wide, and those of the middle bin go through `origin` (row
+    and column). weights: (n, m), 0 where there is nothing."""
     reach = int(np.ceil(np.hypot(*weights.shape) / width)) + 1
     out = np.zeros((angles, 2 * reach + 1))
-    _vote(weights, float(width), out)
+    _vote(weights, float(width), float(origin[0]), float(origin[1]), out)
     return out
 
 
@@ -40,7 +41,7 @@ def peaks(votes: Floats, many: int, apart: float) -> list[tuple[float, float]]:
 
 
 @njit(nogil=True, cache=True)
-def _vote(weights: Any, width: float, out: Any) -> None:
+def _vote(weights: Any, width: float, down: float, right: float, out: Any) -> None:
     angles, middle = out.shape[0], out.shape[1] // 2
     sine, cosine = np.empty(angles), np.empty(angles)
     for k in range(angles):
@@ -50,4 +51,4 @@ def _vote(weights: Any, width: float, out: Any) -> None:
             w = weights[i, j]
             if w > 0.0:
                 for k in range(angles):
-                    out[k, int(np.rint((j * cosine[k] + i * sine[k]) / width)) + middle] += w
+                    out[k, int(np.rint(((j - right) * cosine[k] + (i - down) * sine[k]) / width)) + middle] += w

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pipeline.sites import RadarSite
 from pipeline.state import read_only
+from pipeline.tables import Plots
 
 Grid = tuple[float, float, float, float, float]
 """Azimuth of the first row's centre and the step of rows (rad), slant range of the first cell's centre and the step of
@@ -53,6 +54,17 @@ def scan_converted(
         out[:] = outside
         return out
     convert(read_only(amplitude), grid, (float(place[0]), float(place[1]), float(step), float(up), float(outside)), out)
+    return out
+
+
+def plot_images(
+    plots: Plots, newest: NDArray[np.uint8], site: RadarSite, *, step: float, size: int
+) -> NDArray[np.uint8]:
+    """(n, size, size) the ground about each plot's centroid, north up, on the turn of video in which the plots are."""
+    out = np.zeros((len(plots), size, size), np.uint8)
+    for k in range(len(plots)):
+        place = (float(plots.east[k]) - site.east, float(plots.north[k]) - site.north)
+        out[k] = np.rint(scan_converted(newest, grid_of(site), place, step=step, size=size))
     return out
 
 
