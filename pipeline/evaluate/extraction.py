@@ -67,7 +67,7 @@ class Extraction:
 
     def quick(self) -> Self:
         """Fewer trials at fewer ranges."""
-        return replace(self, trials=16, ranges_m=(200.0, 700.0, 1000.0, 1500.0))
+        return replace(self, trials=12, ranges_m=(200.0, 700.0, 1000.0, 1500.0))
 
     def trial(self, chance: np.random.Generator, number: int, clock: Callable[[], float]) -> Trial:
         """`found`: (extractors, strengths, scenes, ranges, 5); the scenes are those ALONE, then PAIRS."""
@@ -83,14 +83,16 @@ class Extraction:
         return {"found": found}
 
     def rows(self, results: Sequence[Trial]) -> tuple[Row, ...]:
-        """Splits and merges by band of ranges; errors; the calibration of the covariance."""
+        """Splits and merges by band of ranges, errors, and the calibration of the covariance.
+
+        Of all scenes at the first strength, of what matters most at the others; the figures have all."""
         found = np.stack([one["found"] for one in results])
         made: list[Row] = []
         for e, part in enumerate(self.extractors):
             for s, snr in enumerate(self.snr_db):
                 what = f"{part}, {snr:g} dB"
-                made += self._rates(found[:, e, s], what, wanted=part == "hysteresis" and snr >= 20)
-                made += self._calibration(found[:, e, s], what)
+                made += self._rates(found[:, e, s], what, s == 0, wanted=part == "hysteresis" and snr >= 20)
+                made += self._calibration(found[:, e, s], what, s == 0)
         return tuple(made)
 
     def figures(self, results: Sequence[Trial]) -> tuple[Figure, ...]:
@@ -106,17 +108,18 @@ class Extraction:
             *(self._looks(range_m) for range_m in (self.ranges_m[0], self.ranges_m[-2])),
         )
 
-    def _rates(self, found: Floats, what: str, wanted: bool) -> list[Row]:
+    def _rates(self, found: Floats, what: str, whole: bool, wanted: bool) -> list[Row]:
         made = []
+        kinds = range(4 if whole else 1)
         bands = [(band, one[2]) for band, one in enumerate(BANDS) if self._in_band(band).any()]
         for band, where in bands:
             bound = (5.0, 15.0, None, None)[band] if wanted else None
-            made += [self._rate(found, k, band, SPLIT, f"{_name(k)} split {where}, {what}", bound) for k in range(4)]
+            made += [self._rate(found, k, band, SPLIT, f"{_name(k)} split {where}, {what}", bound) for k in kinds]
         for k in range(len(ALONE), len(ALONE) + len(PAIRS)):
-            for band, where in bands:
-                bound = 2.0 if wanted and band < 3 and "15 m" in _name(k) else None
+            for band, where in bands if whole or PAIRS[k - len(ALONE)][2] == 15 else ():
+                bound = 2.0 if wanted and band < 3 and PAIRS[k - len(ALONE)][2] == 15 else None
                 made.append(self._rate(found, k, band, MERGED, f"{_name(k)} merged {where}, {what}", bound))
-        for k in range(4):
+        for k in kinds:
             error = found[:, k, :, ERROR]
             error = error[np.isfinite(error)]
             far = int((error > ACCURACY_M).sum())
@@ -131,11 +134,13 @@ class Extraction:
         values = found[:, scene, self._in_band(band), of]
         return _percent(name, int(values.sum()), values.size, bound)
 
-    def _calibration(self, found: Floats, what: str) -> list[Row]:
+    def _calibration(self, found: Floats, what: str, whole: bool) -> list[Row]:
         made = []
+        everywhere = np.ones(len(self.ranges_m), np.bool_)
+        bands = [(self._in_band(k), one[2]) for k, one in enumerate(BANDS)] if whole else [(everywhere, "everywhere")]
         for k in range(len(ALONE)):
-            for band, (_, _, where) in enumerate(BANDS):
-                values = found[:, k, self._in_band(band), NEES].ravel()
+            for here, where in bands:
+                values = found[:, k, here, NEES].ravel()
                 values = values[np.isfinite(values)]
                 if len(values):
                     name = f"{_name(k)} NEES/2 {where}, {what}"
