@@ -138,6 +138,24 @@ class DetectorContract:
         pieces, _ = mask_of(part, [one for b in blocks for one in cut(b, range(0, 96, 5))], part.start(SMALL))
         np.testing.assert_array_equal(whole, pieces)
 
+    def test_interference_is_bounded_and_counted(self) -> None:
+        """Spokes: whole sweeps saturated, and whole sweeps of noise over all the scale."""
+        rng = np.random.default_rng(4)
+        frames = rayleigh(rng, (6, SMALL.azimuths, SMALL.ranges), 20.0)
+        frames[5, 20:23] = 255
+        frames[5, 50:60] = rng.integers(0, 256, (10, SMALL.ranges))
+        part = self.make(max_runs=96, **self.flooding)
+        state = part.start(SMALL)
+        for block in strip(frames, SMALL):
+            before = state.counters["degraded_sweeps"]
+            found = part(block, state)
+        cells = np.pad(found.cells(SMALL.ranges), ((0, 0), (1, 0))).astype(np.int8)
+        runs = (np.diff(cells, axis=1) == 1).sum(axis=1)
+        assert runs.max() <= 24
+        assert runs[50:60].sum() <= 24 + 10
+        assert found.degraded
+        assert 1 <= state.counters["degraded_sweeps"] - before <= 20
+
     @settings(max_examples=6, deadline=None, suppress_health_check=INHERITED)
     @given(cuts=CUTS, missing=st.integers(0, 2**32 - 1), lost=st.sampled_from([0.0, 0.3]))
     def test_thresholds_are_what_the_call_compares_with(self, cuts: list[int], missing: int, lost: float) -> None:
