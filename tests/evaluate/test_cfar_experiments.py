@@ -31,7 +31,7 @@ from pipeline.parts import available
 HYBRID = tuple(case for case in CASES if case.label == "hybrid")
 SHORT = {
     "scenes": replace(
-        CfarScenes(), trials=2, detectors=HYBRID, scenes=("heterogeneous",), learn_scans=6, ages=(1, 8), listed=(1, 8)
+        CfarScenes(), trials=2, detectors=HYBRID, scenes=("heterogeneous",), learn_scans=4, ages=(1, 6), listed=(1, 6)
     ),
     "rain": replace(CfarRain(), trials=2, detectors=HYBRID, scenes=("held out",), rates=(16.0,), learn_scans=5, early=3,
                     every=20),
