@@ -107,8 +107,8 @@ def place(
     power = np.full(len(KINDS), scene.asphalt_db + log_mean + snr_db)
     power[GRASS] = scene.nominal_db(WEAK) + log_mean + snr_db
     made = Targets(tuple(places), tuple(moving), power, np.zeros(scene.kind.shape, bool))
-    for _, cells in places:
-        made.near.ravel()[cells] = True
+    for _, fixed in places:
+        made.near.ravel()[fixed] = True
     for _, move in moving:
         for age in range(last_age):
             made.near.ravel()[move(age)] = True
