@@ -123,15 +123,17 @@ def _front_end(repeats: int, peers: bool) -> Table:
     from pipeline.measure.bench_frontend import bench_frontend
 
     table = Table(title="Radar front end, one turn of 4096 x 1024 x 8 bit", title_justify="left")
-    for name, side in (("stage", "left"), ("ms", "right"), ("least", "right"), ("x read once", "right"), ("", "left")):
-        table.add_column(name, justify="right" if side == "right" else "left", no_wrap=side == "right")
+    figures = ("ms", "least", "x read once", "wanted")
+    for name in ("stage", *figures, ""):
+        table.add_column(name, justify="right" if name in figures else "left", no_wrap=name in figures)
     for row in bench_frontend(time.perf_counter, repeats, peers):
         table.add_row(
             row.name,
             f"{row.median_s * 1e3:.2f}",
             f"{row.least_s * 1e3:.2f}",
             f"{row.ratio:.1f}",
+            row.wanted,
             row.note,
-            style="dim" if row.peer else None,
+            style="dim" if row.peer else None if row.met else "red",
         )
     return table

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.kernels.components import ComponentState, flush, take_block
+from pipeline.kernels.component_state import ComponentState
+from pipeline.kernels.components import flush, take_block
 from pipeline.kernels.links import LinkRule
 from pipeline.sites import RadarSite
 from pipeline.tables import Detections, Plots, Sweeps

@@ -13,15 +13,27 @@ detected ones, and what holds no detected cell is left out and counted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.kernels.bits import fetch_ahead, filled_words, trailing_zeros
 from pipeline.kernels.compiled import inlined, kernel
-from pipeline.kernels.links import LinkRule
+from pipeline.kernels.component_state import (
+    CELLS,
+    CUT,
+    DROPPED,
+    HEAD,
+    LATEST,
+    MOVE,
+    NEWEST,
+    RETIRED,
+    SEEDLESS,
+    SMALL,
+    TAIL,
+    TAKEN,
+    ComponentState,
+)
 from pipeline.kernels.plot_shape import (
     AZIMUTH,
     BEARING_CELLS,
@@ -31,116 +43,15 @@ from pipeline.kernels.plot_shape import (
     SCAN,
     SINE,
     TIME,
-    TURN_FIELDS,
-    Geometry,
-    PlotColumns,
     measure_plot,
     measure_run,
 )
-from pipeline.kernels.runs import FREE, RUN, any_bit, find, find_runs, unite
-from pipeline.sites import RadarSite
-from pipeline.state import ArrayState, read_only, remembered
+from pipeline.kernels.runs import FREE, any_bit, find, find_runs, unite
+from pipeline.state import read_only
 from pipeline.tables import Detections, Plots, Sweeps
-
-NEWEST, LATEST, RETIRED, HEAD, TAIL, DROPPED, CUT, SMALL, SEEDLESS, CELLS, TAKEN, NUMBERS = range(12)
-"""Places in `ComponentState.numbers`: newest row, newest row with runs, row up to which all are retired, first free
-place and oldest open run of the pool, and counts; TAKEN: steps of the present block that are done."""
 
 AHEAD = 8
 """Rows between asking for cells and reading them."""
-
-MOVE = 512
-"""Delivered runs at the beginning of the pool that are worth moving the others down for."""
-
-
-@dataclass(eq=False, kw_only=True)
-class ComponentState(ArrayState):
-    """The open components. closed_row: see `pipeline.extract`.
-
-    limits: fewest cells of a plot, most rows of a plot, most runs in the rows of open plots.
-    """
-
-    azimuths: int
-    rule: LinkRule
-    geometry: Geometry
-    limits: tuple[int, int, int]
-    room: NDArray[np.int64]
-    radar: NDArray[np.int64] = remembered()
-    runs: NDArray[Any] = remembered()
-    window: NDArray[np.int64] = remembered()
-    window_bits: NDArray[np.uint64] = remembered()
-    numbers: NDArray[np.int64] = remembered()
-    turn: NDArray[np.float64] = remembered()
-
-    @classmethod
-    def of(
-        cls, site: RadarSite, rule: LinkRule, *, min_cells: int, max_extent_turn: float, max_open_runs: int, **more: Any
-    ) -> ComponentState:
-        """A state in which nothing is open.
-
-        max_extent_turn: part of a turn that a plot may cover. more: fields of a subclass. Raises ValueError when the
-        rule reaches over a third of a turn.
-        """
-        video = site.video
-        if rule.rows > max(1, (video.azimuths - 2) // 3):
-            raise ValueError(f"a link over {rule.rows} rows is too far for a turn of {video.azimuths}")
-        slots = 1 << rule.rows.bit_length()
-        window = np.zeros((slots, 3), np.int64)
-        window[:, 0] = -1
-        turn = np.zeros((video.azimuths, TURN_FIELDS))
-        turn[:, GIVEN] = np.nan
-        numbers = np.zeros(NUMBERS, np.int64)
-        numbers[NEWEST] = numbers[LATEST] = numbers[RETIRED] = -1
-        return cls(
-            azimuths=video.azimuths,
-            rule=rule,
-            geometry=Geometry.of(site),
-            limits=(min_cells, max(rule.rows + 1, int(video.azimuths * max_extent_turn)), max_open_runs),
-            room=np.zeros(1, np.int64),
-            radar=np.zeros(1, np.int64),
-            runs=np.zeros(2 * max_open_runs + MOVE, RUN),
-            window=window,
-            window_bits=np.zeros((slots, video.words), np.uint64),
-            numbers=numbers,
-            turn=turn,
-            **more,
-        )
-
-    @property
-    def closed_row(self) -> int:
-        """First absolute row that an open plot, or one still to come, may have."""
-        newest, head, tail = (int(self.numbers[at]) for at in (NEWEST, HEAD, TAIL))
-        if head == tail:
-            return newest + 1
-        return newest - (newest - int(self.runs[tail]["row"])) % self.azimuths
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """Cells in plots, and what was left out or cut, by reason."""
-        n = self.numbers
-        return {
-            "cells_detected": int(n[CELLS]),
-            "plots_below_min_cells": int(n[SMALL]),
-            "plots_without_seed": int(n[SEEDLESS]),
-            "plots_cut_at_max_extent": int(n[CUT]),
-            "runs_dropped": int(n[DROPPED]),
-        }
-
-    @property
-    def pool(self) -> tuple[NDArray[Any], ...]:
-        """What the kernels change."""
-        return self.runs, self.window, self.window_bits, self.numbers, self.turn
-
-    @property
-    def scale(self) -> tuple[Any, ...]:
-        """What the kernels read of the geometry."""
-        one = self.geometry
-        return one.constants, one.ground, one.sums, one.loudness
-
-    def columns(self) -> PlotColumns:
-        """Room for the plots of a block like the last one, and for all that is open."""
-        still_open = int(self.numbers[HEAD] - self.numbers[TAIL])
-        return PlotColumns.room_for(max(256, still_open + 64, int(self.room[0]) * 5 // 4))
 
 
 def take_block(sweeps: Sweeps, detections: Detections, state: ComponentState) -> Plots:

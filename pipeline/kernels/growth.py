@@ -16,17 +16,8 @@ from numpy.typing import NDArray
 
 from pipeline.kernels.bits import count_runs
 from pipeline.kernels.compiled import inlined, kernel
-from pipeline.kernels.components import (
-    NEWEST,
-    TAKEN,
-    ComponentState,
-    fetch_row,
-    flush,
-    note_row,
-    open_runs,
-    retire,
-    take_row,
-)
+from pipeline.kernels.component_state import NEWEST, TAKEN, ComponentState
+from pipeline.kernels.components import fetch_row, flush, note_row, open_runs, retire, take_row
 from pipeline.kernels.links import LinkRule
 from pipeline.kernels.run_cap import CapSettings
 from pipeline.sites import RadarSite

@@ -13,10 +13,11 @@ from hypothesis import strategies as st
 from pipeline.extract import Extractor
 from pipeline.extract.manhattan import Manhattan
 from pipeline.parts import PartError, build
+from pipeline.state import StateError
 from pipeline.tables import Plots, VideoFormat
 from tests.frontend.contracts import ExtractorContract, plots_of
 from tests.frontend.naive import m_graph_components
-from tests.frontend.scenes import packed, site, strip
+from tests.frontend.scenes import SMALL, packed, site, strip
 
 
 class TestManhattanKeepsTheContract(ExtractorContract):
@@ -176,6 +177,63 @@ def test_a_full_pool_drops_and_counts() -> None:
     later[0, 20, 20] = True
     again = strip(np.full((4, 64, 64), 9, np.uint8), video)[3]
     assert len(Plots.concatenate([part(again, packed(later[0]), state), part.flush(state)])) == 1
+
+
+def test_an_amplitude_weighted_centroid_is_nearer_the_strong_cells() -> None:
+    video = VideoFormat(azimuths=64, ranges=200, range_step_m=1.0)
+    cells = np.zeros((1, 64, 200), bool)
+    cells[0, 16:18, 100:104] = True
+    amplitude = np.full(cells.shape, 80, np.uint8)
+    amplitude[0, 16:18, 103] = 80 + 64  # 20 dB more: ten times the amplitude
+    part = Manhattan()
+    plot = plots_of(part, strip(amplitude, video), list(cells), part.start(site(video)))
+    azimuth = (np.array([16, 17]) + 0.5) * video.azimuth_step_rad
+    ground = (100 + 101 + 102 + 10 * 103) / 13
+    assert plot.weighted_east[0] == pytest.approx(100 + ground * np.sin(azimuth).mean())
+    assert plot.weighted_north[0] == pytest.approx(-50 + ground * np.cos(azimuth).mean())
+    assert plot.range[0] == pytest.approx(101.5 * np.hypot(np.sin(azimuth).mean(), np.cos(azimuth).mean()))
+
+
+def test_one_cell_alone_is_its_own_weighted_centroid() -> None:
+    cells = np.zeros((1, 96, 150), bool)
+    cells[0, 30, 40] = cells[0, 60, 90] = True
+    part = Manhattan()
+    plots = plots_of(part, strip(np.full(cells.shape, 9, np.uint8), SMALL), list(cells), part.start(site(height=30.0)))
+    np.testing.assert_array_equal(plots.weighted_east, plots.east)
+    np.testing.assert_array_equal(plots.weighted_north, plots.north)
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "value"),
+    [
+        ("numbers", 4, -1),
+        ("numbers", 3, 10**9),
+        ("numbers", 1, 2**62),
+        ("runs", "parent", 60_000),
+        ("runs", "next", 0),
+        ("runs", "end", 200),
+        ("runs", "ring", 7),
+        ("runs", "row", 96),
+        ("window", 1, -3),
+        ("window", 2, 10**6),
+    ],
+)
+def test_a_saved_state_that_cannot_be_true_is_refused(name: str, place: Any, value: int) -> None:
+    cells = np.random.default_rng(3).random((1, 96, 150)) < 0.05
+    part = Manhattan()
+    state = part.start(site())
+    plots_of(part, strip(np.full(cells.shape, 9, np.uint8), SMALL), list(cells), state, flush=False)
+    saved = state.save()
+    again = part.start(site())
+    again.restore(saved)
+    if name == "numbers":
+        saved[name][place] = value
+    elif name == "runs":
+        saved[name][place][saved["numbers"][3] - 1] = value
+    else:
+        saved[name][saved[name][:, 0] >= 0, place] = value
+    with pytest.raises(StateError):
+        again.restore(saved)
 
 
 @pytest.mark.parametrize(
