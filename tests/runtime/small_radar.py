@@ -23,7 +23,10 @@ def small_site(**values: Any) -> RadarSite:
 
 
 def small_chain(detector: Any = None, extractor: Any = None, **values: Any) -> RadarChain:
-    return RadarChain(small_site(**values), 0, detector or Hybrid(), extractor or Manhattan())
+    """A chain whose kernels are compiled before anybody waits for its thread."""
+    made = RadarChain(small_site(**values), 0, detector or Hybrid(), extractor or Manhattan())
+    made.warm()
+    return made
 
 
 def turn(scan: int, storm: bool = False) -> Iterator[Sweeps]:
