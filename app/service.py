@@ -22,6 +22,7 @@ from pipeline.airport.surfaces import surface_of_radar
 from pipeline.picture import Alert, AlertChange, Picture, RunwayState, SensorState, Visibility
 from pipeline.sites import RadarSite
 from pipeline.tables import NodeEvents, TargetReports
+from pipeline.track.expected_headings import expected_headings
 
 log = logging.getLogger(__name__)
 
@@ -72,7 +73,9 @@ class SurfaceService:
             self.settings, self.airport, self.radars, self.nodes, first_alert=first_alert, clock=time.perf_counter
         )
         engine.tracker.warm()
-        self._surface = SurfaceWorker(engine, self.sensors, self.settings.limits.rows_queued, self._stage_timings)
+        self._surface = SurfaceWorker(
+            engine, self.sensors, self.settings.limits.rows_queued, self._stage_timings, self._expect
+        )
         for index, (site, radar) in enumerate(zip(self.radars, self.settings.radars, strict=True)):
             ground = surface_of_radar(self.airport, site)
             chain = chain_of(site, index, build_parts(self.settings, FRONT_END), ground, time.perf_counter)
@@ -230,6 +233,14 @@ class SurfaceService:
 
     def _first_picture(self, picture: Picture, _changes: tuple[AlertChange, ...]) -> None:
         self.checks["picture"] = True
+
+    def _expect(self, picture: Picture) -> None:
+        """Tell every radar how the tracks that move point, for the bearings of its next plots."""
+        if not self._workers:
+            return
+        coming = expected_headings(picture.tracks, picture.time)
+        for worker in list(self._workers.values()):
+            worker.chain.expect(coming.east, coming.north, coming.heading, coming.sd)
 
     def _stage_timings(self) -> dict[str, float]:
         return {

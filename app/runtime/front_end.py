@@ -123,7 +123,10 @@ class FrontEndSwitch:
         if self._next is made:
             self._next = None
         if well:
-            log.info("radar %s: %s runs, in place of %s", self._worker.site.id, _words(made), _words(before))
+            changed = [verb for verb in made if made[verb] != before[verb]]
+            new, old = ({verb: which[verb] for verb in changed} for which in (made, before))
+            settings = "; ".join(map(repr, new.values()))
+            log.info("radar %s: %s in place of %s: %s", self._worker.site.id, _words(new), _words(old), settings)
 
 
 def _built(wanted: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:

@@ -36,7 +36,11 @@ class Command:
 
 
 class SurfaceWorker:
-    """Owns the engine: nobody else touches it. Sensors' health comes from `sensors`, called once a picture."""
+    """Owns the engine: nobody else touches it.
+
+    Called once a picture: `sensors` for their health, `timings` for those of the radars, and `expect` with the picture,
+    to tell the radars what comes.
+    """
 
     def __init__(
         self,
@@ -44,6 +48,7 @@ class SurfaceWorker:
         sensors: Callable[[], tuple[SensorState, ...]],
         limit: int,
         timings: Callable[[], dict[str, float]] = dict,
+        expect: Callable[[Picture], None] = lambda _: None,
     ) -> None:
         self.engine = engine
         self.inbox: Inbox[SectorPlots | NodeEvents | TargetReports | Command] = Inbox(limit)
@@ -51,6 +56,7 @@ class SurfaceWorker:
         self.failures = 0
         self._sensors = sensors
         self._timings = timings
+        self._expect = expect
         self._listeners: list[PictureListener] = []
         self._listening = threading.Lock()
         self._thread = threading.Thread(target=self._run, name="surface", daemon=True)
@@ -158,6 +164,11 @@ class SurfaceWorker:
         now = picture.time or time.time()
         picture = replace(picture, time=now, sensors=sensors, timings={**self._timings(), **picture.timings})
         self.newest = picture
+        try:
+            self._expect(picture)
+        except Exception:
+            self.failures += 1
+            log.exception("the radars could not be told what to expect")
         changes = (*self._pending, *changes)
         self._pending.clear()
         with self._listening:

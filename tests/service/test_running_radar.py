@@ -119,7 +119,15 @@ def test_parts_change_while_sweeps_flow(radar: Radar, caplog: pytest.LogCaptureF
     assert answer.ms_a_turn.keys() >= {"detect", "extract"}
     assert radar.state().parts["detect"] == "adaptive"
     assert radar.state().counters["sweeps"] == 9 * AZIMUTHS
-    assert "detect adaptive, extract manhattan runs, in place of detect hybrid" in caplog.text
+    assert "smr-1: detect adaptive in place of detect hybrid: Adaptive(" in caplog.text
+
+
+def test_tracks_tell_the_radar_how_their_targets_point(radar: Radar) -> None:
+    told: list[Any] = []
+    radar.service._workers["smr-1"].chain.expect = lambda *columns: told.append(columns)  # type: ignore[method-assign]
+    radar.turns(1)
+    until(lambda: len(told) > 0, "a picture tells what to expect")
+    assert all(len(columns) == 4 for columns in told)
 
 
 def test_a_change_is_taken_back_by_asking_for_what_runs(radar: Radar) -> None:
