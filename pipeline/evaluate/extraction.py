@@ -266,16 +266,17 @@ def _judge(look: Closeup, part: Extractor, pfa: float) -> Floats:
     _, plots = _extract(look, part, pfa, look.amplitude)
     if not len(plots):
         return np.array([0.0, 0.0, 1.0, np.nan, np.nan])
-    # a cell is of the target that answers most in it; the mean of 1 over such cells tells how many a plot has
+    # a cell is of the target that answers most in it; the mean of 1 over such cells tells which part of a plot they are
     whose = np.where(look.power.max(axis=0) > 1, look.power.argmax(axis=0), -1)
-    cells = np.empty((len(look.targets), len(plots)))
+    part_of = np.empty((len(look.targets), len(plots)))
     for t in range(len(look.targets)):
         marked = _extract(look, part, pfa, (whose == t).astype(np.uint8))[1]
-        cells[t] = np.rint(marked.mean_amplitude.astype(float) * marked.cells)
+        part_of[t] = marked.mean_amplitude
+    cells = part_of * plots.cells
     main = cells.argmax(axis=1)
     missed = bool((cells.max(axis=1) == 0).any())
     merged = len(look.targets) > 1 and not missed and main[0] == main[1]
-    split = (cells[0] > plots.cells / 2).sum() > 1
+    split = (part_of[0] > 0.5).sum() > 1
     if cells[0].max() == 0:
         return np.array([split, merged, missed, np.nan, np.nan], float)
     at = main[0]

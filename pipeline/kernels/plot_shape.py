@@ -186,7 +186,7 @@ def measure_run(one: Any, turn: Any, geometry: Any, out: Any, at: int) -> None:
     narrow[5, at] = one.peak
     narrow[6, at] = np.nan
     narrow[7, at] = np.nan
-    narrow_int[8, at] = total
+    narrow_int[8, at] = one.seeds
     window[at, 0] = one.row
     window[at, 1] = 1
     window[at, 2] = start
@@ -201,13 +201,13 @@ def measure_plot(root: int, newest: int, runs: Any, turn: Any, geometry: Any, ou
     TURN_FIELDS), what is known of each row. Position: centroid of the cells on the ground, unweighted; the weighted one
     has the linear amplitude (10 to the power of dB / 20) as weight. Covariance: see position_variance. Axis: second
     moments of the cells (binary), resolution taken out; length and width: extent of the cells along and across that
-    axis, resolution taken out.
+    axis, resolution taken out. All over the plot's cells; their number that is given is that of the detected ones.
     """
     constants, ground_of, sums = geometry
     east, north, height, step, azimuth_step, beam, azimuths, _ = constants
     wide, wide_int, narrow, narrow_int, covariance, window = out
     grid_rows = np.int64(azimuths)
-    total, amplitude, peak, low = np.int64(0), np.int64(0), np.int64(0), np.int64(255)
+    total, seeds, amplitude, peak, low = np.int64(0), np.int64(0), np.int64(0), np.int64(0), np.int64(255)
     first_cell, last_cell = np.int64(runs[root].start), np.int64(runs[root].end)
     first_row = np.int64(runs[root].row)
     rows = (np.int64(runs[root].last) - first_row) % grid_rows + 1
@@ -220,6 +220,7 @@ def measure_plot(root: int, newest: int, runs: Any, turn: Any, geometry: Any, ou
         row = np.int64(one.row)
         n = b - a
         total += n
+        seeds += np.int64(one.seeds)
         amplitude += np.int64(one.total)
         peak = max(peak, np.int64(one.peak))
         low = min(low, np.int64(one.low))
@@ -305,7 +306,7 @@ def measure_plot(root: int, newest: int, runs: Any, turn: Any, geometry: Any, ou
     narrow[5, at] = peak
     narrow[6, at] = bearing
     narrow[7, at] = deviation
-    narrow_int[8, at] = total
+    narrow_int[8, at] = seeds
     window[at, 0] = first_row
     window[at, 1] = rows
     window[at, 2] = first_cell
