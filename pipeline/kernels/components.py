@@ -266,13 +266,10 @@ def retire(
             if one.parent == FREE:
                 continue
             alone = one.next == run
-            total, seeds = np.int64(one.end) - np.int64(one.start), np.int64(one.seeds)
-            root = np.int64(run)
-            if not alone:
-                root = find(runs, root)
-                if runs[root].last != one.row:
-                    continue
-                total, seeds = _sizes(root, runs)
+            root = np.int64(run) if alone else find(runs, np.int64(run))
+            if runs[root].last != one.row:
+                continue
+            total, seeds = np.int64(runs[root].cells), np.int64(runs[root].seeds)
             numbers[CELLS] += total
             if total < limits[0] or seeds == 0:
                 numbers[SMALL if seeds else SEEDLESS] += 1
@@ -293,18 +290,6 @@ def retire(
         tail += 1
     numbers[TAIL] = tail
     return count
-
-
-@inlined()
-def _sizes(root: int, runs: Any) -> Any:
-    total = seeds = np.int64(0)
-    run = np.int64(root)
-    while True:
-        total += np.int64(runs[run].end) - np.int64(runs[run].start)
-        seeds += np.int64(runs[run].seeds)
-        run = np.int64(runs[run].next)
-        if run == root:
-            return total, seeds
 
 
 @kernel()

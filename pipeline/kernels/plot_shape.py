@@ -46,6 +46,8 @@ NARROW = (
 )  # fmt: skip
 """Columns of 8 and of 4 octets, in the order of their rows in PlotColumns; the last of each are integers."""
 
+TYPE = np.dtype("U4")
+
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
@@ -113,14 +115,12 @@ class PlotColumns:
 
     def table(self, radar: int, plots: int) -> Plots:
         """The first so many rows as a table."""
-        made = dict(zip(WIDE, self.wide[:, :plots], strict=True)) | dict(
-            zip(NARROW, self.narrow[:, :plots], strict=True)
-        )
+        made = dict(zip(WIDE + NARROW, (*self.wide[:, :plots], *self.narrow[:, :plots]), strict=True))
         made["scan"] = made["scan"].view(np.int64)
         made["cells"] = made["cells"].view(np.int32)
-        made |= {"covariance": self.covariance[:plots], "window": self.window[:plots]}
-        made |= {"radar": np.full(plots, radar, np.int16)}
-        made |= {"nose_known": np.zeros(plots, np.bool_), "type": np.zeros(plots, "U4")}
+        made["covariance"], made["window"] = self.covariance[:plots], self.window[:plots]
+        made["radar"] = np.full(plots, radar, np.int16)
+        made["nose_known"], made["type"] = np.zeros(plots, np.bool_), np.zeros(plots, TYPE)
         return Plots._of_good(made)
 
 
@@ -140,6 +140,8 @@ def position_variance(
     """
     step, azimuth_step, beam = constants[3], constants[4], constants[5]
     distance = max(ground, step)
+    if total == 1:  # as below, where most of it does not matter
+        return 0.0, step * step / 12 + GLINT, (distance * beam) ** 2 / 12 + GLINT, 1.0
     independent = max(1.0, total * azimuth_step / beam)
     root = np.sqrt(independent)
     share = PLACED + LOST * np.exp(-excess * constants[7]) / np.sqrt(root)

@@ -28,13 +28,14 @@ RUN = np.dtype(
         ("total", "i4"),
         ("peak", "i4"),
         ("low", "i4"),
-        ("spare", "i4"),
+        ("cells", "i4"),
     ]
 )
 """weight, moment: sum over the cells of linear amplitude, and of it times ground range. start, end: range cells
 [start, end). ring: ring of the link rule. row: in the azimuth grid. parent: union-find (FREE: delivered). next: the
-next run of the component, which is a ring of runs. last: in a root, the component's last row in the grid. seeds: cells
-that the detector found. total, peak, low: sum, greatest and least of the log amplitudes."""
+next run of the component, which is a ring of runs. last: in a root, the component's last row in the grid. seeds, cells:
+how many cells the detector found and how many there are, in a root those of the component. total, peak, low: sum,
+greatest and least of the log amplitudes."""
 
 FREE = -1
 
@@ -64,6 +65,8 @@ def unite(runs: Any, a: Any, b: Any, row: Any) -> Any:
     runs[a].next = runs[b].next
     runs[b].next = after
     runs[a].last = row
+    runs[a].seeds += runs[b].seeds
+    runs[a].cells += runs[b].cells
     return a
 
 
@@ -184,6 +187,7 @@ def find_runs(
             run.start, run.end, run.ring, run.row = begin, end, ring, row
             run.parent, run.next, run.last = head, head, row
             run.seeds = count_set(seeds, begin, end) if grown else end - begin
+            run.cells = end - begin
             run.total, run.peak, run.low = total, peak, low
             # the neighbour in the row is enough: the reach falls with range, so what links over a run links to it
             if head > first and begin - (np.int64(runs[head - 1].end) - 1) <= reach[ring, 0]:
