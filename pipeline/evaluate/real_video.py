@@ -43,8 +43,8 @@ class RealVideo:
         " full scale is taken for 80 dB (0.3125 dB an 8-bit step, the chain's own default); no map; the recording is"
         " repeated after its last turn, so a turn comes back. 20 turns learn. Found again: a plot of 4 cells or more"
         " has a plot within 15 m in the next turn; large echoes of land move their centroid more, hence the overlap of"
-        " windows beside it. Fixed thing: 4 or more adjacent cells, each above three quarters of"
-        " full scale in nine of ten turns; seen in a turn when any of its cells is detected"
+        " windows beside it. Fixed thing: 4 or more adjacent cells that in nine of ten turns are more than half way up"
+        " from the median of the recording to its greatest; seen when any of its cells is detected in any of 3 turns"
     )
     trials: int = field(default_factory=lambda: 2 * len(every_part()))
     video: RecordedVideo | None = None
@@ -185,10 +185,13 @@ def video_format(video: RecordedVideo) -> VideoFormat:
 def fixed_things(octets: NDArray[np.uint8], least_cells: int) -> tuple[NDArray[np.int64], int]:
     """(azimuths, ranges) number from 1 on of the fixed thing in each cell, 0 where there is none; and how many.
 
-    Adjacent cells that are above three quarters of full scale in nine of ten turns; what lies across north is two.
+    The steady level of a cell is what it has at least in nine of ten turns. Adjacent cells whose steady level is more
+    than half way from the median of all to the greatest are a thing; what lies across north is two.
     """
-    steady = (octets >= 192).mean(axis=0) >= 0.9
-    groups, _ = label(steady, structure=np.ones((3, 3)))
+    tenth = len(octets) // 10
+    steady = np.partition(octets, tenth, axis=0)[tenth]
+    floor = float(np.median(steady))
+    groups, _ = label(steady > (floor + float(steady.max())) / 2, structure=np.ones((3, 3)))
     counts = np.bincount(groups.ravel())
     counts[0] = 0
     number = np.zeros(len(counts), np.int64)
