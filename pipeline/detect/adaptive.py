@@ -5,64 +5,105 @@ where a macro-cell is homogeneous and its clutter Rayleigh. The threshold of a c
 
     level(patch) + offset(cell) + mu * spread(patch) / spread(Rayleigh)
 
-* A patch is a macro-cell cut by the surface kinds of the map. Its level is the mean of (log amplitude - offset) without
-  what stands out, remembered for little more than a scan, so that rain is followed.
+* A patch is a macro-cell cut by the surface kinds of the map, in tiles of 8 cells by 16 rows. Its level is the mean of
+  (log amplitude - offset) without what stands out, remembered for a few scans, and for less when it rises by more than
+  chance.
+* Rain adds power, it does not multiply: the darkest ground near by tells how much, all patches are raised by that, and
+  no limit lies below what the rain alone asks for.
 * The offset is the cell's own texture, remembered for a minute and more, not learned from what stands out, and bounded
   on the pavement, so that a target that stands still is never learned away.
-* The spread is the standard deviation of what is left. Weibull clutter is a location-scale family in the log domain, so
+* The spread is the mean magnitude of what is left. Weibull clutter is a location-scale family in the log domain, so
   the false alarm rate holds for every Weibull shape.
-* Cells beside a border of surface kinds, and buildings, are patches of their own with wide bounds: a clutter map, whose
-  level follows only the changes of the ground about it.
+* Tiles of several surface kinds, and buildings, are patches of their own with wide bounds, nearly a clutter map; the
+  pavement in them begins at the level of its like near by.
+
+Start: the first `learn_scans` scans show nothing. The next rest on offsets of few scans: on the demonstration's airport
+the false alarm rate over all cells is some hundred times the nominal one in scan 13, on its pavement some ten times,
+and falls with every scan. For the first 64 scans every row learns, later every eighth.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.detect.calibration import estimation_loss_db, threshold_offset_db, truncated_rayleigh_db
-from pipeline.detect.checks import check_start
-from pipeline.detect.patches import BUILDING, EDGE, GRASS, Patches
-from pipeline.kernels.adaptive import ONE, detect
+from pipeline.detect.calibration import estimation_loss_db, residual_moments_db, threshold_offset_db
+from pipeline.detect.checks import check_pfa, check_positive, check_start, check_whole
+from pipeline.detect.patches import BUILDING, GRASS, MIXED, Patches
+from pipeline.kernels.adaptive import DRY, Rule, detect
 from pipeline.kernels.run_cap import CapSettings
-from pipeline.state import ArrayState, read_only, remembered
+from pipeline.kernels.tiles import STILL
+from pipeline.state import ArrayState, StateError, read_only, remembered
 from pipeline.tables import Detections, Sweeps, VideoFormat
+
+PAVED, GROWN, BORDER, BUILT = range(4)
+"""Classes of tiles, by what their offsets may do."""
+
+FIRST = (30.0, 2.0, 1.0, 1.0)
+"""Scans of nothing that the offsets of a class begin with: the variance of a sample over that of the texture."""
+
+WIDE_DB = (22.0, 40.0)
+"""Greatest offsets of tiles of several kinds, without and with buildings."""
+
+FREE_SCANS = 30
+"""For so long all but pavement learns from everything, also from what stands out."""
+
+FADE_DB_PER_M = 0.04
+"""A patch so much darker may be a metre farther away to tell of rain as well."""
+
+LEAST_KEPT = 0.8
+"""A residual counts down to this much of the greatest that counts: deep fades tell little of the level."""
+
+UNKNOWN = np.array([127, 127, 0, -128, 126, 0, -128, STILL], np.int8).view(np.uint64)[0]
+"""The rule of a patch before it was swept; see `pipeline.kernels.tiles`."""
 
 
 @dataclass(eq=False, kw_only=True)
 class AdaptiveState(ArrayState):
-    """offset: of each cell, in 1/128 step. level, spread, bias: of each patch, in steps. heard: scans in which each
-    patch was swept. scan: the newest, how many are over, and `heard` of the patch
-    swept last for the first time. moved: of each patch, the scan after which its base moved.
-    stale: of each row, the scan up to which its limits are true; -1 not at all. limits: uint8, 64 cells a word.
-    growth_steps: threshold less growth threshold in Rayleigh clutter; nan without growth. lower: the same of each cell
-    of the row being swept."""
+    """Of each cell: offset, whole steps, and fine, 1/256 steps. times: how often each row has learned. Of each patch:
+    level and dry in steps above 128, short and long memory; spread relative to Rayleigh clutter; heard: scans; sums;
+    rule, drop: what its tiles are compared with; mean, least: of that rule. lowest, rain: of each macro-cell. The rest
+    is the stripe of tiles being swept, and the run cap."""
 
     azimuths: int
-    rule: tuple[float, ...]
-    run_at: NDArray[np.int64]
-    runs: NDArray[np.int32]
-    macro: NDArray[np.int64]
-    bounds: NDArray[np.int32]
-    wide: NDArray[np.bool_]
-    soft: NDArray[np.bool_]
+    settings: Rule
+    tile: NDArray[np.int32]
+    macro: NDArray[np.int32]
+    kind: NDArray[np.uint8]
+    expected: NDArray[np.float32]
+    telling: NDArray[np.bool_]
+    near: NDArray[np.int32]
+    apart: NDArray[np.float32]
+    like: NDArray[np.int32]
+    gain: NDArray[np.float32]
+    own_rain: NDArray[np.float32]
+    strict: NDArray[np.uint64]
     tail: NDArray[np.uint8]
-    growth_steps: float
-    lower: NDArray[np.uint8]
-    offset: NDArray[np.int16] = remembered()
-    level: NDArray[np.float64] = remembered()
-    spread: NDArray[np.float64] = remembered()
-    bias: NDArray[np.float64] = remembered()
-    base: NDArray[np.int32] = remembered()
-    sums: NDArray[np.float64] = remembered()
-    heard: NDArray[np.int64] = remembered()
-    scan: NDArray[np.int64] = remembered()
-    moved: NDArray[np.int64] = remembered()
-    stale: NDArray[np.int64] = remembered()
-    limits: NDArray[np.uint8] = remembered()
+    limits: NDArray[np.uint8]
+    drops: NDArray[np.uint8]
+    offset: NDArray[np.int8] = remembered()
+    fine: NDArray[np.uint8] = remembered()
+    times: NDArray[np.int32] = remembered()
+    level: NDArray[np.float32] = remembered()
+    dry: NDArray[np.float32] = remembered()
+    spread: NDArray[np.float32] = remembered()
+    heard: NDArray[np.int32] = remembered()
+    sums: NDArray[np.uint64] = remembered()
+    rule: NDArray[np.uint64] = remembered()
+    drop: NDArray[np.uint8] = remembered()
+    lowest: NDArray[np.int32] = remembered()
+    source: NDArray[np.int32] = remembered()
+    rain: NDArray[np.float32] = remembered()
+    mean: NDArray[np.float32] = remembered()
+    least: NDArray[np.float32] = remembered()
+    rules: NDArray[np.uint64] = remembered()
+    pending: NDArray[np.uint64] = remembered()
+    cursor: NDArray[np.int64] = remembered()
     budget: NDArray[np.float64] = remembered()
     degraded_sweeps: NDArray[np.int64] = remembered()
 
@@ -71,22 +112,34 @@ class AdaptiveState(ArrayState):
         """degraded_sweeps: sweeps whose threshold was raised to stay under the cap on runs."""
         return {"degraded_sweeps": int(self.degraded_sweeps[0])}
 
+    def refuse_untrue(self, saved: Mapping[str, NDArray[Any]]) -> None:
+        """Raise StateError for an index out of bounds, or a negative count."""
+        bounds = {"lowest": (-1, len(self.level)), "source": (0, len(self.rain)), "times": (0, 2**30)}
+        for name, (least, end) in {**bounds, "heard": (0, 2**30)}.items():
+            if ((saved[name] < least) | (saved[name] >= end)).any():
+                raise StateError(f"{name}: numbers that cannot be true")
+        if not -1 <= saved["cursor"][1] < len(self.tile):
+            raise StateError("cursor: numbers that cannot be true")
+
 
 @dataclass(frozen=True)
 class Adaptive:
     """See the module. The first `learn_scans` scans only learn; what stands on the pavement is not learned away.
 
-    pfa: false alarm probability in Rayleigh and Weibull clutter. macro_cell_m: side of the macro-cells. level_scans:
-    memory of the levels. offset_scans: memory of the offsets once the start is over; it begins with a sixth of it.
-    spread_scans: memory of the spreads. most_offset_db: how far a pavement cell may be learned up; grass_offset_db: the
+    pfa: false alarm probability in Rayleigh and Weibull clutter. macro_cell_m: side of the macro-cells. level_scans,
+    calm_scans: memory of the levels that change and of those that do not. offset_scans: how often a cell learns before
+    its memory grows no more; it then learns in every eighth scan. spread_scans: memory of the spreads. dry_scans: of
+    the levels that rain is told by. most_offset_db: how far a pavement cell may be learned up; grass_offset_db: the
     same for grass. margin_db: what comes this near to the threshold is not learned. max_runs: as in `hybrid`.
     """
 
     pfa: float = 1e-6
     macro_cell_m: float = 100.0
-    level_scans: float = 1.7
+    level_scans: float = 1.5
+    calm_scans: float = 4.0
     offset_scans: int = 64
-    spread_scans: float = 30.0
+    spread_scans: float = 12.0
+    dry_scans: float = 64.0
     most_offset_db: float = 8.0
     grass_offset_db: float = 16.0
     margin_db: float = 3.5
@@ -94,67 +147,59 @@ class Adaptive:
     max_runs: int = 40_000
 
     def __post_init__(self) -> None:
-        if not 0 < self.pfa < 0.5:
-            raise ValueError("pfa must lie between 0 and 0.5")
-        if not self.macro_cell_m > 0:
-            raise ValueError("macro_cell_m must be greater than 0")
-        if (
-            self.level_scans < 1
-            or self.offset_scans < 12
-            or self.spread_scans < 1
-            or min(self.learn_scans, self.max_runs) < 1
-        ):
-            raise ValueError("scans and max_runs must be 1 or more, offset_scans 12 or more")
+        check_pfa(self.pfa)
+        check_positive(macro_cell_m=self.macro_cell_m, grass_offset_db=self.grass_offset_db)
+        check_positive(most_offset_db=self.most_offset_db, margin_db=self.margin_db)
+        check_whole(learn_scans=self.learn_scans, max_runs=self.max_runs)
+        check_whole(12, offset_scans=self.offset_scans)
+        if min(self.level_scans, self.calm_scans, self.spread_scans, self.dry_scans) < 1:
+            raise ValueError("level_scans, calm_scans, spread_scans and dry_scans must be 1 or more")
 
     def start(
         self, video: VideoFormat, surface: NDArray[np.uint8] | None = None, growth_db: float | None = None
     ) -> AdaptiveState:
         """The state before the first sweep. Without a map all is one surface kind."""
         check_start(video, surface, growth_db)
-        shape = (video.azimuths, video.ranges)
         if surface is None:
-            surface = np.full(shape, 2, np.uint8)
+            surface = np.full((video.azimuths, video.ranges), 2, np.uint8)
         patches = Patches.build(video, surface, self.macro_cell_m)
-        kind, many = patches.kind, len(patches.kind)
-        step = video.db_per_step
-        offset_db = threshold_offset_db(self.pfa, step)
-        gain = 1.0 / self.offset_scans
-        mu = offset_db + estimation_loss_db(self.pfa, step) * gain / (2 - gain)
-        missing_db, spread_db = truncated_rayleigh_db(offset_db - self.margin_db)
-        rayleigh = spread_db / step
+        many, cells, tiles = len(patches.kind), (video.azimuths, 64 * video.words), 8 * video.words
+        macros = int(patches.macro.max()) + 1
         return AdaptiveState(
             azimuths=video.azimuths,
-            rule=(
-                (mu + missing_db) / step,
-                rayleigh,
-                self.margin_db / step,
-                1.0 / self.level_scans,
-                1.0 / self.spread_scans,
-                float(self.offset_scans),
-                12.0 / step,
-                7.0 / step,
-                float(self.learn_scans),
-            ),
-            run_at=patches.run_at,
-            runs=patches.runs,
-            macro=patches.macro,
-            bounds=self._bounds(kind, step),
-            wide=(kind >= EDGE) | (kind == BUILDING),
-            soft=(kind >= EDGE) | (kind == BUILDING) | (kind == GRASS),
+            settings=self._rule(video, growth_db or 0.0),
+            tile=patches.tile,
+            macro=patches.macro.astype(np.int32),
+            kind=_classes(patches.kind),
+            expected=patches.cells.astype(np.float32),
+            telling=patches.telling,
+            near=patches.near.astype(np.int32),
+            apart=(patches.distance * FADE_DB_PER_M / video.db_per_step).astype(np.float32),
+            like=patches.like.astype(np.int32),
+            source=np.arange(macros, dtype=np.int32),
+            gain=np.zeros(many, np.float32),
+            own_rain=np.zeros(macros, np.float32),
+            strict=patches.paved,
             tail=np.zeros(64, np.uint8),
-            growth_steps=np.nan if growth_db is None else max((mu + missing_db - growth_db) / step, 0.0),
-            lower=np.zeros(0 if growth_db is None else 64 * video.words, np.uint8),
-            offset=np.zeros(shape, np.int16),
-            level=np.zeros(many),
-            spread=np.full(many, rayleigh),
-            bias=np.zeros(many),
-            base=np.full(many, 10_000, np.int32),
-            sums=np.zeros((many, 5)),
-            heard=np.zeros(many, np.int64),
-            scan=np.array([-1, 0, 0], np.int64),
-            moved=np.zeros(many, np.int64),
-            stale=np.full(video.azimuths, -1, np.int64),
-            limits=np.full((video.azimuths, 64 * video.words), 255, np.uint8),
+            limits=np.zeros(64 * video.words, np.uint8),
+            offset=np.zeros(cells, np.int8),
+            fine=np.full(cells, 128, np.uint8),
+            times=np.zeros(video.azimuths, np.int32),
+            level=np.zeros(many, np.float32),
+            dry=np.zeros(many, np.float32),
+            spread=np.ones(many, np.float32),
+            heard=np.zeros(many, np.int32),
+            sums=np.zeros(many, np.uint64),
+            rule=np.full(many, UNKNOWN, np.uint64),
+            drop=np.zeros(many, np.uint8),
+            lowest=np.full(macros, -1, np.int32),
+            rain=np.full(macros, DRY, np.float32),
+            mean=np.zeros(many, np.float32),
+            least=np.full(many, -128.0, np.float32),
+            rules=np.zeros(tiles, np.uint64),
+            drops=np.zeros(0 if growth_db is None else cells[1], np.uint8),
+            pending=np.zeros(tiles, np.uint64),
+            cursor=np.array([-1, -1, 0, 0, 0], np.int64),
             budget=np.array([CapSettings.of(self.max_runs, video.azimuths).depth]),
             degraded_sweeps=np.zeros(1, np.int64),
         )
@@ -170,9 +215,8 @@ class Adaptive:
         return used
 
     def _run(self, sweeps: Sweeps, state: AdaptiveState, used: NDArray[np.uint8]) -> Detections:
-        words = (sweeps.amplitude.shape[1] + 63) // 64
-        mask = np.zeros((len(sweeps), words), np.uint64)
-        growth = np.zeros((len(sweeps) if len(state.lower) else 0, words), np.uint64)
+        mask = np.empty((len(sweeps), state.limits.size // 64), np.uint64)
+        growth = np.empty((len(sweeps), state.drops.size // 64), np.uint64)
         before = int(state.degraded_sweeps[0])
         cap = CapSettings.of(self.max_runs, state.azimuths)
         detect(
@@ -180,36 +224,74 @@ class Adaptive:
             read_only(sweeps.row, np.int64),
             sweeps.scan,
             (mask, growth, used),
-            state.rule,
-            (state.run_at, state.runs, state.macro, state.bounds, state.wide, state.soft),
+            state.settings,
+            (state.tile, state.macro, state.kind, state.expected, state.telling, state.near, state.apart, state.like),
+            (state.offset, state.fine, state.times, state.strict),
             (
-                state.offset,
                 state.level,
+                state.dry,
                 state.spread,
-                state.bias,
-                state.base,
-                state.sums,
                 state.heard,
-                state.scan,
-                state.moved,
-                state.stale,
+                state.sums,
+                state.rule,
+                state.drop,
+                state.lowest,
+                state.rain,
+                state.mean,
+                state.least,
+                state.gain,
+                state.own_rain,
+                state.source,
             ),
-            (cap.refill, cap.depth, state.budget, state.degraded_sweeps),
-            state.limits,
+            (state.rules, state.drops, state.pending, state.cursor),
+            (cap.refill, cap.depth, state.budget, state.degraded_sweeps, state.limits),
             state.tail,
-            (state.growth_steps, state.lower),
         )
         degraded = int(state.degraded_sweeps[0]) > before
-        return Detections(mask, degraded, growth if len(state.lower) else None)
+        return Detections(mask, degraded, growth if state.drops.size else None)
 
-    def _bounds(self, kind: NDArray[np.int64], step: float) -> NDArray[np.int32]:
-        """(patches, 2) least and greatest offset in 1/128 step."""
-        most = np.full(len(kind), self.most_offset_db)
-        most[kind == GRASS] = self.grass_offset_db
-        most[kind >= EDGE] = 22.0
-        most[kind == BUILDING] = 30.0
-        least = np.where(kind >= EDGE, -22.0, -20.0)
-        return np.rint(np.stack([least, most], axis=1) * ONE / step).astype(np.int32)
+    def _rule(self, video: VideoFormat, growth_db: float) -> Rule:
+        step = video.db_per_step
+        offset_db = threshold_offset_db(self.pfa, step)
+        gain = 1.0 / (self.offset_scans + FIRST[PAVED])
+        keep_db = offset_db - self.margin_db
+        mu = offset_db + estimation_loss_db(self.pfa, step) * gain / (2 - gain)
+        missing, magnitude, deviation = residual_moments_db(keep_db, -LEAST_KEPT * keep_db)
+        most = [self.most_offset_db, self.grass_offset_db, *WIDE_DB]
+        return Rule(
+            threshold=np.float32(mu / step),
+            growth=np.float32(growth_db / step),
+            keep=np.float32(keep_db / step),
+            least=np.float32(LEAST_KEPT * keep_db / step),
+            missing=np.float32(missing / step),
+            magnitude=np.float32(magnitude / step),
+            deviation=np.float32(deviation / step),
+            calm=np.float32(1 / self.calm_scans),
+            quick=np.float32(1 / self.level_scans),
+            spread=np.float32(1 / self.spread_scans),
+            dry=np.float32(1 / self.dry_scans),
+            learn=np.float32(self.learn_scans),
+            soft=np.float32(FREE_SCANS),
+            dead=np.float32(0.7 / step),
+            wet=np.float32(4.0 / step),
+            below=np.float32(0.5 / step),
+            step_db=np.float32(step),
+            long=float(self.offset_scans),
+            first=FIRST,
+            most=_four([one / step for one in most]),
+            azimuths=video.azimuths,
+        )
 
 
 PART = Adaptive
+
+
+def _classes(kind: NDArray[np.int64]) -> NDArray[np.uint8]:
+    built = (kind == BUILDING) | (kind == MIXED + BUILDING)
+    made = np.select([built, kind >= MIXED, kind == GRASS], [BUILT, BORDER, GROWN], PAVED)
+    return made.astype(np.uint8)
+
+
+def _four(steps: list[float]) -> np.uint64:
+    """Four signed bytes in one word, the first lowest."""
+    return np.uint64(np.array([*np.clip(np.rint(steps), -127, 127), 0, 0, 0, 0], np.int8).view(np.uint64)[0])

@@ -1,242 +1,400 @@
-"""The sweep of the adaptive detector: compare, learn, and bring patches up to date between scans."""
+"""The sweep of the adaptive detector: compare, learn, and bring the patches up to date between scans."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
-from pipeline.kernels.bits import bits_above, bits_above_lowered, count_runs
+from pipeline.kernels.bits import borrowed, count_runs
 from pipeline.kernels.run_cap import fit_row
+from pipeline.kernels.tiles import (
+    BASE,
+    CENTRE,
+    CLASS,
+    FLOOR,
+    FREE,
+    KEEP,
+    LEAST,
+    MEAN,
+    STILL,
+    WET,
+    learn_tiles,
+    tile_bits,
+    tile_bits_lowered,
+    tile_limits,
+)  # fmt: skip
 
-ONE = 128
-"""Units of an offset in one step of the log amplitude."""
+TILE_ROWS = 16
+"""Rows of a tile."""
 
-LEARN_EVERY = 6
-"""Once the start is over, a row learns in every sixth scan: its offsets then remember for minutes."""
+LEARN_EVERY = 8
+"""Once the start is over, a row learns in every eighth scan: its offsets then remember for minutes."""
 
-STILL = 1.2
-"""Steps that a patch's threshold must be off before it is moved: most rows then need no new limits."""
+DRY = -1000.0
+"""Rain of no power, in steps."""
 
 FEW = 0.45
 """Where less than this part of a patch is ordinary, it is the patch that has changed, not what stands on it."""
 
-START_SCANS = 30
-"""For so long grass, borders and buildings learn from everything, also from what stands out."""
+SPREADS = (0.93, 1.8)
+"""Least and greatest spread to follow, relative to Rayleigh clutter."""
+
+ALARM = 8.0
+"""A level that rises by a standard deviation more than its sample would is followed faster, and by three as fast as
+allowed."""
+
+ENOUGH = 250
+"""Cells that tell a level well."""
+
+RAISED = 80
+"""Steps by which the level of tiles with buildings is raised, as far as there is room: their other cells are below."""
+
+AGAIN = 6
+"""Pavement begins by its like in the first scan, and in this one, when bright things tell less."""
+
+
+class Rule(NamedTuple):
+    """Settings in steps and scans, float32 where no other type is told.
+
+    threshold, growth: above the level, at the spread of Rayleigh clutter; so are keep (what counts for the means) and
+    least (what residuals are raised to). missing, magnitude: mean and mean magnitude of the residuals that are left of
+    Rayleigh clutter; deviation: their standard deviation. calm, quick: gain of a level that does as expected, and of
+    one that does not. spread, dry: gains of the spreads and of the dry levels. learn: scans before anything is shown.
+    soft: scans in which all but pavement learns from everything. dead: what rain must raise a level by to count as
+    rain. wet: how far above the rain alone the least level is, and pavement above its like at first.
+    below: how far below the level the least is at least. long: times a row learns before its gain stays. first: scans
+    of nothing that the offsets of each class begin with. most: greatest offset of each class, a byte each (uint64).
+    """
+
+    threshold: Any
+    growth: Any
+    keep: Any
+    least: Any
+    missing: Any
+    magnitude: Any
+    deviation: Any
+    calm: Any
+    quick: Any
+    spread: Any
+    dry: Any
+    learn: Any
+    soft: Any
+    dead: Any
+    wet: Any
+    below: Any
+    step_db: Any
+    long: Any
+    first: Any
+    most: Any
+    azimuths: Any
 
 
 @njit(nogil=True, cache=True)
 def detect(
-    amplitude: Any,
-    rows: Any,
-    scan: int,
-    made: Any,
-    rule: Any,
-    layout: Any,
-    memory: Any,
-    cap: Any,
-    limits: Any,
-    tail: Any,
-    growing: Any,
-) -> None:
-    """One block through the detector. made: mask, growth mask and limits used (n rows each, or none), written."""
-    current = memory[7]
-    refill, depth, budget, degraded = cap
-    mask, growth, used = made
-    growth_steps, lower = growing
+    amplitude: Any, rows: Any, scan: int, made: Any, rule: Any, layout: Any, cells: Any, patches: Any, swept: Any,
+    cap: Any, tail: Any,
+) -> None:  # fmt: skip
+    """One block through the detector.
+
+    made: mask, growth mask, and limits before the cap; (n) rows each, or none. rule: see `pipeline.detect.adaptive`.
+    layout: what does not change; cells: offsets and their fractions, and how often each row has learned; patches:
+    what is known of each; swept: the stripe being swept; all changed in place. tail: 64 bytes.
+    """
+    amplitude, rows, tail = borrowed(amplitude), borrowed(rows), borrowed(tail)
+    mask, growth, used = borrowed(made[0]), borrowed(made[1]), borrowed(made[2])
+    offset, fine, times, never_free = borrowed(cells[0]), borrowed(cells[1]), borrowed(cells[2]), borrowed(cells[3])
+    rules, drops, pending, cursor = borrowed(swept[0]), borrowed(swept[1]), borrowed(swept[2]), borrowed(swept[3])
+    refill, depth, budget, degraded, limits = cap
     n, ranges = amplitude.shape
     words = mask.shape[1]
     whole = ranges // 64
-    tail_at, lower_at = tail.ctypes.data, lower.ctypes.data
+    rules_at, drops_at, tail_at = rules.ctypes.data, drops.ctypes.data, tail.ctypes.data
+    if cursor[1] >= 0:
+        _take_drops(layout[0][cursor[1]], patches[6], drops)  # they are not saved
     for i in range(n):
-        if scan != current[0]:
-            if current[0] >= 0:
-                _finish_scan(rule, layout, memory)
-            current[0] = scan
-        row = rows[i]
-        cells, limit, bits = amplitude[i], limits[row], mask[i]
-        _refresh(row, limit, rule, layout, memory)
-        if used.size:
-            used[i] = limit[:ranges]
-        row_at, limits_at = cells.ctypes.data, limit.ctypes.data
+        row: Any = np.uintp(rows[i])
+        if scan != cursor[0] or row // np.uintp(TILE_ROWS) != np.uintp(cursor[1]):
+            _next_stripe(scan, row // np.uintp(TILE_ROWS), rule, layout, cells, patches, swept)
+        cursor[2] += 1
+        bits, own = mask[i], offset[row]
+        row_at, own_at = amplitude.ctypes.data + np.uintp(i) * np.uintp(ranges), own.ctypes.data
         anything = np.uint64(0)
         for w in range(whole):
             at = np.uintp(64 * w)
-            word = bits_above(row_at + at, limits_at + at)
+            word = tile_bits(row_at + at, own_at + at, rules_at + at)
             bits[w] = word
             anything |= word
         if words > whole:
-            for j in range(ranges - 64 * whole):
-                tail[j] = cells[64 * whole + j]
-            bits[whole] = bits_above(tail_at, limits_at + np.uintp(64 * whole))
+            at = np.uintp(64 * whole)
+            _fill(tail, amplitude[i], whole, 0)
+            bits[whole] = tile_bits(tail_at, own_at + at, rules_at + at)
             anything |= bits[whole]
-        if lower.size:
-            _lower(row, lower, growth_steps, rule, layout, memory)
-            more = growth[i]
-            for w in range(whole):
-                at = np.uintp(64 * w)
-                more[w] = bits_above_lowered(row_at + at, limits_at + at, lower_at + at)
-            if words > whole:
-                at = np.uintp(64 * whole)
-                more[whole] = bits_above_lowered(tail_at, limits_at + at, lower_at + at)
+        if used.size:
+            _limits(own_at, rules_at, limits)
+            used[i] = limits[:ranges]
         budget[0] = min(budget[0] + refill, depth)
+        fits = True
         if anything:
             runs = count_runs(bits)
-            if runs <= budget[0]:
+            fits = runs <= budget[0]
+            if fits:
                 budget[0] -= runs
             else:
                 degraded[0] += 1
-                fit_row(cells, limits_at, bits, budget, tail)
-        due = (scan + row) % LEARN_EVERY == 0
-        if due or current[2] < rule[5]:
-            _learn(cells, limit, row, due, rule, layout, memory)
+                _limits(own_at, rules_at, limits)
+                fit_row(amplitude[i], limits.ctypes.data, bits, budget, tail)
+        if growth.size:
+            more = growth[i]
+            for w in range(words):
+                at = np.uintp(64 * w)
+                from_at = row_at + at if w < whole else tail_at
+                found = tile_bits_lowered(from_at, own_at + at, rules_at + at, drops_at + at)
+                more[w] = found if fits else bits[w]
+        if times[row] < rule.long or (scan + np.int64(row)) % LEARN_EVERY == 0:
+            gains, most, strict = _gains(times[row], rule), rule.most, never_free[row]
+            fine_at, sums_at = fine[row].ctypes.data, pending.ctypes.data
+            times[row] += 1
+            cursor[4] += 1
+            for w in range(words):
+                at = np.uintp(64 * w)
+                if w == whole:
+                    _fill(tail, amplitude[i], whole, 255)
+                from_at = row_at + at if w < whole else tail_at
+                learn_tiles(from_at, own_at + at, fine_at + at, rules_at + at, sums_at + at, strict[w], gains, most)
 
 
 @njit(nogil=True, cache=True)
-def _lower(row: int, lower: Any, growth_steps: float, rule: Any, layout: Any, memory: Any) -> None:
-    """How far the growth threshold of each cell of the row lies below its threshold; 0 where nothing is shown yet."""
-    run_at, runs = layout[0], layout[1]
-    spread, heard = memory[2], memory[6]
-    for k in range(run_at[row], run_at[row + 1]):
-        p = runs[k, 2]
-        steps = np.rint(growth_steps * _scale(spread[p], rule[1])) if heard[p] >= rule[8] else 0.0
-        lower[runs[k, 0] : runs[k, 1]] = np.uint8(min(steps, 255.0))
+def _fill(tail: Any, cells: Any, whole: int, rest: int) -> None:
+    tail[:] = rest
+    for j in range(cells.size - 64 * whole):
+        tail[j] = cells[64 * whole + j]
 
 
 @njit(nogil=True, cache=True)
-def _refresh(row: int, limit: Any, rule: Any, layout: Any, memory: Any) -> None:
-    """Bring the row's limits up to date where its patches or its offsets have moved since it was last swept."""
-    run_at, runs = layout[0], layout[1]
-    base, heard, moved, stale = memory[4], memory[6], memory[8], memory[9]
-    own = memory[0][row]
-    everything = stale[row] < 0
-    for k in range(np.uintp(run_at[row]), np.uintp(run_at[row + 1])):
-        p = np.uintp(runs[k, 2])
-        if not everything and moved[p] <= stale[row]:
+def _limits(own_at: int, rules_at: int, limits: Any) -> None:
+    """Write the limits of one row."""
+    for w in range(limits.size // 64):
+        at = np.uintp(64 * w)
+        tile_limits(own_at + at, rules_at + at, limits.ctypes.data + at)
+
+
+@njit(nogil=True, cache=True)
+def _gains(times: int, rule: Any) -> Any:
+    """The gain of each of the four classes, in 1/256, one a byte: of a mean that begins with some scans of nothing."""
+    four = np.uint64(0)
+    for number in range(4):
+        scans = min(times + rule.first[number], rule.long + rule.first[0])
+        four |= np.uint64(min(256.0 / scans + 0.5, 255.0)) << np.uint64(8 * number)
+    return four
+
+
+@njit(nogil=True, cache=True)
+def _next_stripe(scan: int, stripe: int, rule: Any, layout: Any, cells: Any, patches: Any, swept: Any) -> None:
+    """Hand over what the last stripe taught, and take the rules of the next."""
+    tile = borrowed(layout[0])
+    sums, rule_of, drop_of = borrowed(patches[4]), borrowed(patches[5]), borrowed(patches[6])
+    rules, drops, pending, cursor = borrowed(swept[0]), borrowed(swept[1]), borrowed(swept[2]), borrowed(swept[3])
+    if cursor[1] >= 0:
+        of = tile[np.uintp(cursor[1])]
+        for t in range(pending.size):
+            sums[np.uintp(of[t])] += pending[t]
+            pending[t] = 0
+    if scan != cursor[0]:
+        if cursor[0] >= 0:
+            update_patches(rule, layout, cells, patches, cursor)
+        cursor[0] = scan
+        cursor[2] = 0
+        cursor[4] = 0
+    cursor[1] = stripe
+    of = tile[np.uintp(stripe)]
+    for t in range(rules.size):
+        rules[t] = rule_of[np.uintp(of[t])]
+    _take_drops(of, drop_of, drops)
+
+
+@njit(nogil=True, cache=True)
+def _take_drops(of: Any, drop_of: Any, drops: Any) -> None:
+    for k in range(drops.size):
+        drops[k] = drop_of[of[k // 8]]
+
+
+@njit(nogil=True, cache=True, error_model="numpy")  # without a test for 0 the loops are vectors
+def update_patches(rule: Any, layout: Any, cells: Any, patches: Any, cursor: Any) -> None:
+    """Bring the patches up to date with the scan that is over, and make their rules for the next."""
+    macro, kind_class, expected = borrowed(layout[1]), borrowed(layout[2]), borrowed(layout[3])
+    level, dry, spread, heard = borrowed(patches[0]), borrowed(patches[1]), borrowed(patches[2]), borrowed(patches[3])
+    sums, rule_of, drop_of = borrowed(patches[4]), borrowed(patches[5]), borrowed(patches[6])
+    rain, mean_at, least_at, gain_of = borrowed(patches[8]), borrowed(patches[9]), borrowed(patches[10]), patches[11]
+    one = np.float32(1.0)
+    fresh: Any = False
+    full = cursor[2] == rule.azimuths
+    share = np.float32(FEW * cursor[4] / rule.azimuths)
+    cursor[3] += 1
+    for p in range(level.size):
+        packed = sums[p]
+        sums[p] = 0
+        count = np.float32(np.int64(packed & np.uint64(0xFFFF)))
+        first = np.float32(np.int64((packed >> np.uint64(16)) & np.uint64(0xFFFFFF)))
+        second = np.float32(np.int64(packed >> np.uint64(40)))
+        n = max(count, one)
+        young = heard[p] == 0
+        told = count > 0
+        scans = np.float32(heard[p])
+        s = spread[p]
+        moved = first / n + least_at[p] - (level[p] - mean_at[p])
+        moved = moved if young else moved - rule.missing * s
+        calm = min(rule.calm, n / np.float32(ENOUGH))
+        surprise = moved * abs(moved) * n / (rule.deviation * rule.deviation * s * s) - one
+        gain = calm + (rule.quick - calm) * min(max(surprise / np.float32(ALARM), np.float32(0.0)), one)
+        gain = max(gain, one / (scans + one))
+        few = full and not young and count < share * expected[p]
+        move = rule.keep * s if few else gain * moved
+        level[p] += move if told or few else np.float32(0.0)
+        wider = second / (n * rule.magnitude) - s
+        faster = max(rule.spread * n / (n + np.float32(100.0)), one / (scans + np.float32(3.0)))
+        s = s if young or few or not told else s + faster * wider
+        spread[p] = min(max(s, np.float32(SPREADS[0])), np.float32(SPREADS[1]))
+        risen = level[p] - dry[p]
+        slower = rule.dry if risen < rule.dead else rule.dry * np.float32(0.125)
+        slower = max(np.float32(0.25) if risen < 0 else slower, one / (scans + one))
+        dry[p] = level[p] if young else dry[p] + slower * risen
+        gain_of[p] = gain
+        fresh |= told and (young or heard[p] == AGAIN - 1)
+        heard[p] += np.int32(told or few)
+    if fresh or cursor[3] % 16 == 0:
+        _find_sources(layout, heard, dry, patches[7], patches[13])
+    _fall_of_rain(rule, layout, patches)
+    if fresh:
+        _begin(rule, layout, cells, patches)
+    turn = np.float32(cursor[3] * 0.6180339887)
+    dither = turn - np.floor(turn)
+    for p in range(level.size):
+        young = heard[p] == 0
+        s = spread[p]
+        above = rule.threshold * s
+        base = np.floor(level[p] + above + np.float32(0.5))
+        wet = min(rain[macro[p]] + rule.wet, level[p] - rule.below)
+        mean = np.float32(0.0) if young else np.floor(level[p] + np.float32(0.5))
+        least = np.float32(-128.0) if young else -np.floor(rule.least * s)
+        deaf = np.float32(heard[p]) < rule.learn or base > np.float32(127.0)
+        free = kind_class[p] > 0 and np.float32(heard[p]) < rule.soft
+        flags = np.uint64(STILL) if young else np.uint64(FREE) if free else np.uint64(0)
+        mean_at[p] = mean
+        least_at[p] = least
+        rule_of[p] = (
+            (_byte(base) << np.uint64(8 * BASE))
+            | (_byte(np.float32(127.0) if deaf else np.floor(wet + above + np.float32(0.5))) << np.uint64(8 * FLOOR))
+            | (_byte(mean) << np.uint64(8 * MEAN))
+            | (_byte(np.floor(wet + np.float32(0.5))) << np.uint64(8 * WET))
+            | (_byte(np.float32(126.0) if young else np.floor(rule.keep * s)) << np.uint64(8 * KEEP))
+            | (_byte(np.floor(rule.missing * s + level[p] - mean + dither)) << np.uint64(8 * CENTRE))
+            | (_byte(least) << np.uint64(8 * LEAST))
+            | ((np.uint64(kind_class[p]) | flags) << np.uint64(8 * CLASS))
+        )
+        lower = base - np.floor(level[p] + rule.growth * s + np.float32(0.5))
+        drop_of[p] = np.uint8(0 if deaf else min(max(lower, np.float32(0.0)), np.float32(127.0)))
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _fall_of_rain(rule: Any, layout: Any, patches: Any) -> None:
+    """How hard it rains on each macro-cell, by the rise of its darkest patch, and the other patches raised by that: the
+    power of rain adds to that of the ground."""
+    macro, source = layout[1], patches[13]
+    level, dry, heard = borrowed(patches[0]), borrowed(patches[1]), borrowed(patches[3])
+    lowest, rain, gain_of, own = patches[7], patches[8], patches[11], patches[12]
+    to_power = np.float32(np.log(10.0) / 10.0) * rule.step_db
+    nothing = np.float32(DRY)
+    for m in range(own.size):
+        dark = np.uintp(max(lowest[m], 0))
+        rise = level[dark] - dry[dark]
+        own[m] = nothing
+        if lowest[m] >= 0 and rise > rule.dead:
+            own[m] = dry[dark] + np.log(np.exp(rise * to_power) - np.exp(rule.dead * to_power)) / to_power
+    changed = False
+    for m in range(own.size):
+        changed |= own[source[m]] != rain[m]
+    if not changed:
+        return
+    for p in range(level.size):
+        here = macro[p]
+        before, after = rain[here], own[source[here]]
+        if before == after or lowest[here] == p or heard[p] == 0:
             continue
-        level = np.int32(base[p]) if heard[p] >= rule[8] else np.int32(10_000)
-        for j in range(np.uintp(runs[k, 0]), np.uintp(runs[k, 1])):
-            value = level + ((np.int32(own[j]) + np.int32(ONE // 2)) >> np.int32(7))
-            limit[j] = np.uint8(min(max(value, np.int32(0)), np.int32(255)))
-    stale[row] = memory[7][1]
+        over = max(before, after) - dry[p]
+        if over > np.float32(-20.0) / rule.step_db:
+            was, now = np.exp((before - dry[p]) * to_power), np.exp((after - dry[p]) * to_power)
+            level[p] += (np.float32(1.0) - gain_of[p]) * np.log((1 + now) / (1 + was)) / to_power
+    for m in range(own.size):
+        rain[m] = own[source[m]]
 
 
 @njit(nogil=True, cache=True)
-def _learn(cells: Any, limit: Any, row: int, due: bool, rule: Any, layout: Any, memory: Any) -> None:
-    """Take one row into the sums of its patches, and let its offsets and limits follow. due: also the old patches."""
-    _, rayleigh, margin, _, _, long, below, above, _ = rule
-    run_at, runs, _, bounds, _, soft = layout
-    offset, level, spread, bias, base, sums, heard, _, _, _ = memory
-    own = offset[row]
-    least_error, most_error = np.int32(-below * ONE), np.int32(above * ONE)
-    for k in range(np.uintp(run_at[row]), np.uintp(run_at[row + 1])):
-        p = np.uintp(runs[k, 2])
-        age = np.float64(heard[p])
-        if not due and age >= long:
-            continue
-        step = max(1.0 / long, 1.0 / (age + (2.0 if soft[p] else 12.0))) if age > 0 else 0.0
-        gain = np.int32(8192 * step)
-        middle, centre = np.int32(level[p] * ONE), np.int32(bias[p] * ONE)
-        ordinary = np.int32((base[p] - margin * _scale(spread[p], rayleigh)) * ONE)
-        learnable = np.int32(2**30) if soft[p] and age < START_SCANS else ordinary
-        least, most = bounds[p, 0], bounds[p, 1]
-        shown = np.int32(base[p]) if age >= rule[8] else np.int32(10_000)
-        count, first, second, errors = np.int32(0), np.int32(0), np.int32(0), np.int32(0)
-        # without a branch and in 32 bits, so that the compiler makes it one loop of vectors
-        for j in range(np.uintp(runs[k, 0]), np.uintp(runs[k, 1])):
-            rest = (np.int32(cells[j]) << np.int32(7)) - np.int32(own[j])
-            apart = rest - middle
-            kept = np.int32(rest <= ordinary)
-            error = min(max(apart, least_error), most_error)
-            coarse = (apart >> np.int32(5)) * kept
-            count += kept
-            first += (apart >> np.int32(2)) * kept
-            second += coarse * coarse
-            errors += (error >> np.int32(2)) * kept
-            change = (((error - centre) * gain) >> np.int32(13)) * np.int32(rest <= learnable)
-            new = min(max(np.int32(own[j]) + change, least), most)
-            own[j] = np.int16(new)
-            value = shown + ((new + np.int32(ONE // 2)) >> np.int32(7))
-            limit[j] = np.uint8(min(max(value, np.int32(0)), np.int32(255)))
-        sums[p, 0] += count
-        sums[p, 1] += 4.0 * first
-        sums[p, 2] += 1024.0 * second
-        sums[p, 3] += 4.0 * errors
-        sums[p, 4] += runs[k, 1] - runs[k, 0]
+def _find_sources(layout: Any, heard: Any, dry: Any, lowest: Any, source: Any) -> None:
+    """The darkest telling patch of each macro-cell, and the macro-cell near it whose darkest patch tells most of its
+    rain: dark and near."""
+    macro, telling, near, apart = layout[1], layout[4], layout[5], layout[6]
+    lowest[:] = -1
+    for p in range(heard.size):
+        if heard[p] > 0 and telling[p]:
+            known = lowest[macro[p]]
+            if known < 0 or dry[p] < dry[known]:
+                lowest[macro[p]] = p
+    for m in range(lowest.size):
+        best = np.float32(1e9)
+        for k in range(near.shape[1]):
+            p = lowest[near[m, k]]
+            if p >= 0 and dry[p] + apart[m, k] < best:
+                best = dry[p] + apart[m, k]
+                source[m] = near[m, k]
 
 
 @njit(nogil=True, cache=True)
-def _finish_scan(rule: Any, layout: Any, memory: Any) -> None:
-    """Bring the patches that were swept up to date with the scan that is over."""
-    mu, rayleigh, margin, level_gain, spread_gain = rule[0], rule[1], rule[2], rule[3], rule[4]
-    macro, wide, soft = layout[2], layout[4], layout[5]
-    _, level, spread, bias, base, sums, heard, current, moved_at, _ = memory
-    current[1] += 1
-    changes = np.zeros((macro.max() + 1, 2))
-    fresh = np.zeros(level.size, np.bool_)
-    for p in range(level.size):
-        count, swept = sums[p, 0], sums[p, 4]
-        if swept > 0 and count < FEW * swept:
-            level[p] += margin  # most of it stands out: the ground itself has risen
-            heard[p] += 1
-        elif count > 0:
-            moved = sums[p, 1] / count / ONE
-            variance = max(sums[p, 2] / count / ONE**2 - moved**2, 0.0)
-            faster = max(spread_gain, 1.0 / (heard[p] + 1.0))
-            if heard[p] == 0:
-                level[p] += moved
-                fresh[p] = wide[p]
-                if soft[p]:
-                    spread[p] = np.sqrt(variance)
-            else:
-                spread[p] += faster * (np.sqrt(variance) - spread[p])
-                bias[p] += faster * (sums[p, 3] / count / ONE - moved - bias[p])
-                if not wide[p]:
-                    level[p] += level_gain * moved
-                    changes[macro[p], 0] += level_gain * moved * count
-                    changes[macro[p], 1] += count
-            heard[p] += 1
-        sums[p] = 0.0
-    for p in range(level.size):
-        if wide[p] and not fresh[p] and changes[macro[p], 1] > 0:
-            level[p] += changes[macro[p], 0] / changes[macro[p], 1]
-        if heard[p] == 0:
-            continue
-        wanted = level[p] + mu * _scale(spread[p], rayleigh)
-        if abs(wanted - base[p]) > STILL or heard[p] == np.int64(rule[8]):
-            base[p] = np.int32(np.floor(wanted + 0.5))
-            moved_at[p] = current[1]
-    current[2] = current[1]
-    for p in range(level.size):
-        if heard[p] > 0:
-            current[2] = min(current[2], heard[p])
-    if fresh.any():
-        _start_wide(layout, memory, fresh)
+def _begin(rule: Any, layout: Any, cells: Any, patches: Any) -> None:
+    """What patches that were just swept for the first time (and again some scans later) begin with.
 
-
-@njit(nogil=True, cache=True)
-def _scale(spread: float, rayleigh: float) -> float:
-    """How much wider than Rayleigh; the bounds are those of Weibull clutter worth following."""
-    return min(max(spread / rayleigh, 0.93), 1.75)
-
-
-@njit(nogil=True, cache=True)
-def _start_wide(layout: Any, memory: Any, fresh: Any) -> None:
-    """Cells beside a border begin at the greatest level of their macro-cell, and come down to their own."""
-    run_at, runs, macro, bounds, _, _ = layout
-    offset, level, heard, stale = memory[0], memory[1], memory[6], memory[9]
-    stale[:] = -1
-    highest = np.zeros(macro.max() + 1)
+    A patch of pavement begins not far above its like, because a parked aircraft may fill it. Pavement in a tile of
+    several kinds begins at the level of its like, so that what stands on it from the first scan on stands out. A tile
+    with buildings has its level raised, because its offsets must reach from pavement to walls.
+    """
+    tile, kind_class, like = layout[0], layout[2], layout[7]
+    offset, strict = cells[0], cells[3]
+    level, heard = patches[0], patches[3]
+    raised = np.zeros(level.size, np.int64)
     for p in range(level.size):
-        if heard[p] > 0:
-            highest[macro[p]] = max(highest[macro[p]], level[p])
+        if heard[p] == 1 and kind_class[p] == 3:
+            room = np.float32(119.0) - level[p] - rule.threshold * np.float32(1.5)
+            raised[p] = np.int64(min(max(room, np.float32(0.0)), np.float32(RAISED)))
+            level[p] += np.float32(raised[p])
+        elif (heard[p] == 1 or heard[p] == AGAIN) and kind_class[p] == 0 and like[p, 0] >= 0:
+            level[p] = min(level[p], _greatest(like[p], heard, level, level[p]) + rule.wet)
     for row in range(offset.shape[0]):
-        own = offset[row]
-        for k in range(run_at[row], run_at[row + 1]):
-            p = runs[k, 2]
-            if not fresh[p]:
+        of = tile[row // TILE_ROWS]
+        for t in range(of.size):
+            p = of[t]
+            if raised[p] > 0:
+                offset[row, 8 * t : 8 * t + 8] = np.int8(-raised[p])
+            if (heard[p] != 1 and heard[p] != AGAIN) or like[p, 0] < 0 or kind_class[p] == 0:
                 continue
-            up = min(np.int64((highest[macro[p]] - level[p]) * ONE), np.int64(bounds[p, 1]))
-            for j in range(runs[k, 0], runs[k, 1]):
-                own[j] = up
+            own = level[p] - np.float32(raised[p])
+            begins = _greatest(like[p], heard, level, own) - level[p]
+            for j in range(8):
+                if (strict[row, t // 8] >> np.uint64(8 * (t % 8) + j)) & np.uint64(1):
+                    offset[row, 8 * t + j] = np.int8(min(max(begins, np.float32(-127.0)), np.float32(127.0)))
+
+
+@njit(nogil=True, cache=True)
+def _greatest(like: Any, heard: Any, level: Any, otherwise: Any) -> Any:
+    """The greatest level of those patches that were swept."""
+    greatest = np.float32(-1000.0)
+    for q in like:
+        if heard[q] > 0:
+            greatest = max(greatest, level[q])
+    return greatest if greatest > np.float32(-1000.0) else otherwise
+
+
+@njit(nogil=True, cache=True)
+def _byte(value: Any) -> Any:
+    """A signed number within a byte, in the low bits."""
+    return np.uint64(np.int64(min(max(value, np.float32(-128.0)), np.float32(127.0)))) & np.uint64(255)
