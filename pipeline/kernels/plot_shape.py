@@ -13,9 +13,10 @@ from pipeline.kernels.runs import FREE
 from pipeline.sites import RadarSite
 from pipeline.tables import Plots
 
-PLACED = 0.0075
+PLACED = 0.012
 """Part of the cells' own spread by which the middle of a target strays from that of its echo, however strong: the echo
-does not weigh nose and tail alike, nor the near side and the far one."""
+does not weigh nose and tail alike, nor the near side and the far one. Rather more than dense scatterers want (0.0075):
+with a few strong ones (`pipeline.simulate.scatter`) it strays farther."""
 
 LOST = 0.7
 """Part of the cells' own spread that a target loses with the parts of it that are not detected."""
