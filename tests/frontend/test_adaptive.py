@@ -6,13 +6,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numba import njit
 from numpy.typing import NDArray
 from scipy.stats import binom
 
 from pipeline.detect import Detector
 from pipeline.detect.adaptive import Adaptive
+from pipeline.kernels.tiles import learn_tiles, tile_bits, tile_bits_lowered, tile_limits
 from pipeline.parts import build
 from pipeline.tables import Sweeps, VideoFormat
+from tests.frontend import naive_adaptive
 from tests.frontend.contracts import DetectorContract
 
 VIDEO = VideoFormat(azimuths=256, ranges=256, range_step_m=3.0, beamwidth_rad=0.03)
@@ -38,7 +43,7 @@ def clutter(chance: np.random.Generator, shape: float = 2.0) -> NDArray[np.float
     return np.asarray(20 / shape * np.log10(chance.exponential(size=size)))
 
 
-@pytest.mark.parametrize(("shape", "factor"), [(2.0, 3), (1.6, 3), (1.2, 6)])
+@pytest.mark.parametrize(("shape", "factor"), [(2.0, 3), (1.6, 3), (1.2, 3)])
 def test_false_alarms_in_homogeneous_clutter_within_binomial_bounds(shape: float, factor: int) -> None:
     chance = np.random.default_rng(1)
     part = Adaptive(pfa=1e-4)
@@ -150,3 +155,63 @@ def test_thresholds_are_those_of_the_call_and_change_nothing() -> None:
         for name, array in state.save().items():
             np.testing.assert_array_equal(array, before[name])
         np.testing.assert_array_equal(part(turn, state).cells(VIDEO.ranges), turn.amplitude > limits)
+
+
+@njit
+def one_word(cells: Any, offset: Any, fine: Any, rules: Any, drops: Any, sums: Any, strict: Any, four: Any) -> Any:
+    x, o, r = cells.ctypes.data, offset.ctypes.data, rules.ctypes.data
+    made = np.empty(64, np.uint8)
+    tile_limits(o, r, made.ctypes.data)
+    above, grown = tile_bits(x, o, r), tile_bits_lowered(x, o, r, drops.ctypes.data)
+    learn_tiles(x, o, fine.ctypes.data, r, sums.ctypes.data, strict, four[0], four[1])
+    return made, above, grown
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), extreme=st.booleans())
+def test_eight_tiles_at_a_time_are_what_one_cell_at_a_time_is(seed: int, extreme: bool) -> None:
+    chance = np.random.default_rng(seed)
+    reach = 128 if extreme else 40
+    cells = chance.integers(0, 256, 64, dtype=np.uint8)
+    offset = chance.integers(-reach, reach, 64, dtype=np.int8)
+    fine = chance.integers(0, 256, 64, dtype=np.uint8)
+    rules = chance.integers(-reach, reach, (8, 8), dtype=np.int8)
+    rules[:, 7] = chance.integers(0, 16, 8)
+    drops = np.repeat(chance.integers(0, 128, 8, dtype=np.uint8), 8)
+    bits = chance.integers(0, 2, 64)
+    gains, most = chance.integers(0, 256, 4, dtype=np.uint8), chance.integers(0, 128, 4, dtype=np.int8)
+    words = [np.concatenate([one.view(np.uint8), np.zeros(4, np.uint8)]).view(np.uint64)[0] for one in (gains, most)]
+    strict = np.packbits(bits.astype(bool), bitorder="little").view(np.uint64)[0]
+    sums = np.full(8, 5 + (7 << 16) + (9 << 40), np.uint64)
+    args = [one.astype(np.int64) for one in (cells, offset, fine, rules, bits)]
+    expected_limits = naive_adaptive.limits(args[1], args[3])
+    wanted = naive_adaptive.learn(*args, gains.tolist(), most.tolist())
+    limits, above, grown = one_word(cells, offset, fine, rules, drops, sums, strict, (words[0], words[1]))
+    np.testing.assert_array_equal(limits.astype(int) - 128, expected_limits)
+    lower = np.maximum(expected_limits - drops, -128)
+    for word, limit in ((above, expected_limits), (grown, lower)):
+        found = np.unpackbits(np.array([word], np.uint64).view(np.uint8), bitorder="little")
+        np.testing.assert_array_equal(found, args[0] - 128 > limit)
+    np.testing.assert_array_equal(offset, wanted[0])
+    np.testing.assert_array_equal(fine, wanted[1])
+    got = np.stack([sums & 0xFFFF, (sums >> 16) & 0xFFFFFF, sums >> 40], axis=1).astype(np.int64) - (5, 7, 9)
+    np.testing.assert_array_equal(got, wanted[2])
+
+
+def test_rain_over_pavement_and_grass_raises_every_limit_by_power() -> None:
+    chance = np.random.default_rng(7)
+    surface = np.full((VIDEO.azimuths, VIDEO.ranges), 2, np.uint8)
+    surface[:, 100:] = 0
+    ground = np.where(np.arange(VIDEO.ranges) >= 100, 42.0, 30.0)
+    part = Adaptive()
+    state = part.start(VIDEO, surface)
+    worst = 0.0
+    for number in range(130):
+        rain = 30.0 - 12.0 + np.clip(number - 90, 0, 24)
+        mean = 10 * np.log10(10 ** (ground / 10) + (10 ** (rain / 10) if number >= 90 else 0.0))
+        turn = scan(number, mean + clutter(chance))
+        if number >= 95:
+            limit = (part.thresholds(turn, state) + 0.5) * VIDEO.db_per_step
+            worst = max(worst, float(np.exp(-(10 ** ((limit - mean) / 10))).mean()))
+        part(turn, state)
+    assert worst < 1e-4

@@ -1,0 +1,42 @@
+"""The tile kernels of the adaptive detector, cell by cell in whole numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.kernels.tiles import BASE, CENTRE, CLASS, FLOOR, FREE, KEEP, LEAST, MEAN, STILL, WET
+
+Whole = NDArray[np.int64]
+
+
+def _fits(value: int) -> int:
+    return min(max(value, -128), 127)
+
+
+def limits(offset: Whole, rules: Whole) -> Whole:
+    """(64) signed limits. offset: (64). rules: (8 tiles, 8) signed bytes."""
+    rule = rules[np.arange(64) // 8]
+    return np.array([max(_fits(o + r[BASE]), r[FLOOR]) for o, r in zip(offset.tolist(), rule.tolist(), strict=True)])
+
+
+def learn(
+    cells: Whole, offset: Whole, fine: Whole, rules: Whole, strict: Whole, gains: list[int], most: list[int]
+) -> tuple[Whole, Whole, Whole]:
+    """The offsets and fines that follow, and (8, 3) what each tile's sums gain: count, residuals, magnitudes."""
+    new_offset, new_fine, sums = offset.copy(), fine.copy(), np.zeros((8, 3), np.int64)
+    for j in range(64):
+        r = rules[j // 8].tolist()
+        residual = _fits(int(cells[j]) - 128 - max(_fits(int(offset[j]) + r[MEAN]), r[WET]))
+        bounded = max(residual, r[LEAST])
+        kept = residual <= r[KEEP]
+        if kept:
+            sums[j // 8] += (1, (bounded - r[LEAST]) % 256, abs(residual))
+        number, free, still = r[CLASS] & 3, bool(r[CLASS] & FREE), bool(r[CLASS] & STILL)
+        if strict[j]:
+            number, free = min(number, 1), False
+        error = _fits(bounded - r[CENTRE]) if (kept or free) and not still else 0
+        moved = min(max(256 * int(offset[j]) + int(fine[j]) + error * gains[number], -32768), 32767)
+        moved = min(moved, 256 * most[number])
+        new_offset[j], new_fine[j] = moved >> 8, moved & 255
+    return new_offset, new_fine, sums
