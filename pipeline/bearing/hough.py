@@ -58,7 +58,7 @@ class Hough:
         """The directions (rad from true north, modulo pi) of the `many` fullest lines, 20 degrees apart or more."""
         grid, video = grid_of(site, view.azimuth, view.range_m), site.video
         contrast = self.cell_db / video.db_per_step
-        echo = measured(view.amplitude, view.plot, grid, video.beamwidth_rad, contrast)
+        echo = measured(view.amplitude, view.plot, grid, video.beamwidth_rad, self.cell_db, video.db_per_step)
         if echo is None or echo.cells < self.least_cells:
             return []
         place = (echo.east, echo.north)

@@ -53,7 +53,7 @@ class HoughTemplate:
         """The bearing of one target, and its type when there is a choice."""
         grid, video = grid_of(state.site, view.azimuth, view.range_m), state.site.video
         axes = self.lines.axes(view, state.site, self.peaks)
-        echo = measured(view.amplitude, view.plot, grid, video.beamwidth_rad, self.cell_db / video.db_per_step)
+        echo = measured(view.amplitude, view.plot, grid, video.beamwidth_rad, self.cell_db, video.db_per_step)
         if echo is None or not axes:
             return NO_BEARING
         headings = [

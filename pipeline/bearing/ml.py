@@ -115,7 +115,7 @@ class MaximumLikelihood:
         site = state.site
         grid = grid_of(site, view.azimuth, view.range_m)
         db_per_step, beam = site.video.db_per_step, site.video.beamwidth_rad
-        echo = measured(view.amplitude, view.plot, grid, beam, self.cell_db / db_per_step)
+        echo = measured(view.amplitude, view.plot, grid, beam, self.cell_db, db_per_step)
         if echo is None or echo.cells < self.least_cells:
             return NO_BEARING
         ring = int(np.argmin(np.abs(state.widths - echo.range_m * beam)))

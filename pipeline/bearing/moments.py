@@ -40,8 +40,15 @@ class Moments:
     def __call__(self, view: TargetView, expected: Expected | None, state: RadarSite) -> Bearing:
         """The bearing of one target."""
         grid, video = grid_of(state, view.azimuth, view.range_m), state.video
-        contrast = self.cell_db / video.db_per_step
-        echo = measured(view.amplitude, view.plot, grid, video.beamwidth_rad, contrast, weighted=self.weighted)
+        echo = measured(
+            view.amplitude,
+            view.plot,
+            grid,
+            video.beamwidth_rad,
+            self.cell_db,
+            video.db_per_step,
+            weighted=self.weighted,
+        )
         if echo is None or echo.parts < self.least_parts:
             return NO_BEARING
         axis, major, minor = echo.axis

@@ -57,8 +57,7 @@ class Template:
     def __call__(self, view: TargetView, expected: Expected | None, state: TypeBank) -> Bearing:
         """The bearing and type of one target."""
         grid, video = grid_of(state.site, view.azimuth, view.range_m), state.site.video
-        contrast = self.cell_db / video.db_per_step
-        echo = measured(view.amplitude, view.plot, grid, video.beamwidth_rad, contrast)
+        echo = measured(view.amplitude, view.plot, grid, video.beamwidth_rad, self.cell_db, video.db_per_step)
         if echo is None or echo.cells < self.least_cells:
             return NO_BEARING
         fit = state.correlations(view, echo, np.arange(ANGLES))

@@ -12,14 +12,20 @@ from numpy.typing import NDArray
 from pipeline.kernels.scan_convert import Grid
 from pipeline.state import read_only
 
+RAYLEIGH_QUARTILE_DB = 3.01
+"""Upper quartile of Rayleigh ground over its median; where it lies higher, a part of the ground is brighter."""
+
+MOST_MIXED_DB = 12.0
+"""What is brighter than this over the median is no ground: buildings, other targets."""
+
 
 @dataclass(frozen=True, slots=True)
 class Echo:
     """What was measured.
 
-    background: median amplitude of the ground about the plot. cells: those of the plot that stand out of it. parts:
-    resolution cells that they fill. east, north: m from the radar, their middle. cxx, cxy, cyy: m^2, their covariance
-    (xx: east), the beam's width taken out. range_m: m on the ground.
+    background: median amplitude of the ground about the plot, of its brighter part when it is mixed. cells: those of
+    the plot that stand out of it. parts: resolution cells that they fill. east, north: m from the radar, their middle.
+    cxx, cxy, cyy: m^2, their covariance (xx: east), the beam's width taken out.
     """
 
     background: float
@@ -55,15 +61,16 @@ def measured(
     plot: tuple[int, int, int, int],
     grid: Grid,
     beamwidth_rad: float,
-    contrast: float,
+    contrast_db: float,
+    db_per_step: float,
     *,
     weighted: bool = False,
 ) -> Echo | None:
     """The echo in the plot's window (first row, rows, first cell, cells); None when nothing stands out, or
     no ground is shown about it to stand out of.
 
-    contrast: amplitude steps over the median of the ground from which on a cell belongs to the echo. weighted: by the
-    steps above the ground. Rows without any amplitude were not received and tell nothing of the ground.
+    contrast_db: over the median of the ground, from which on a cell belongs to the echo. weighted: by the steps above
+    the ground. Rows without any amplitude were not received and tell nothing of the ground.
     """
     out = np.empty(8)
     rows, cells = amplitude.shape
@@ -72,24 +79,26 @@ def measured(
     window = (first, min(first + count, rows), near, min(near + deep, cells))
     if window[0] >= window[1] or window[2] >= window[3]:
         return None
-    if not _measure(read_only(amplitude), window, grid, float(beamwidth_rad), float(contrast), weighted, out):
+    step_db = float(db_per_step)
+    contrast = contrast_db / step_db
+    if not _measure(read_only(amplitude), window, grid, float(beamwidth_rad), contrast, weighted, step_db, out):
         return None
     return Echo(float(out[0]), int(out[1]), *(float(one) for one in out[2:]))
 
 
 @njit(nogil=True, cache=True)
-def _median(histogram: Any, total: int) -> Any:
+def _quantile(histogram: Any, wanted: float) -> Any:
     reached = 0
     for level in range(256):
         reached += histogram[level]
-        if 2 * reached >= total:
+        if reached >= wanted:
             # inside the step, so that coarse video has no steps of its own
-            return level + 0.5 - (reached - 0.5 * total) / histogram[level]
+            return level + 0.5 - (reached - wanted) / histogram[level]
     return 255.0
 
 
 @njit(nogil=True, cache=True)
-def _ground(amplitude: Any, window: Any) -> Any:
+def _ground(amplitude: Any, window: Any, quartile: float, most: float) -> Any:
     top, bottom, near, far = window
     histogram = np.zeros(256, np.int64)
     total = seen = 0
@@ -107,14 +116,17 @@ def _ground(amplitude: Any, window: Any) -> Any:
                 histogram[row[j]] += 1
                 total += 1
     if total:
-        return _median(histogram, total)
+        middle, upper = _quantile(histogram, 0.5 * total), _quantile(histogram, 0.75 * total)
+        return min(max(upper - quartile, middle), middle + most)
     return 0.0 if seen else np.nan
 
 
 @njit(nogil=True, cache=True)
-def _measure(amplitude: Any, window: Any, grid: Any, beam: float, contrast: float, weighted: bool, out: Any) -> bool:
+def _measure(
+    amplitude: Any, window: Any, grid: Any, beam: float, contrast: float, weighted: bool, step_db: float, out: Any
+) -> bool:
     first_azimuth, azimuth_step, first_range, range_step, height = grid
-    background = _ground(amplitude, window)
+    background = _ground(amplitude, window, RAYLEIGH_QUARTILE_DB / step_db, MOST_MIXED_DB / step_db)
     if np.isnan(background):
         return False
     limit = background + contrast

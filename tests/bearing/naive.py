@@ -10,15 +10,17 @@ from pipeline.bearing import TargetView
 from pipeline.sites import RadarSite
 
 
-def cells_of(view: TargetView, site: RadarSite, contrast: float) -> tuple[Any, Any, Any]:
+def cells_of(view: TargetView, site: RadarSite, contrast_db: float) -> tuple[Any, Any, Any]:
     """East, north and steps over the ground of the plot's cells."""
     amplitude = view.amplitude.astype(float)
     top, rows, near, deep = view.plot
     outside = np.ones(amplitude.shape, bool)
     outside[top : top + rows, near : near + deep] = False
     outside[(amplitude == 0).all(axis=1)] = False
-    ground = np.median(amplitude[outside])
-    i, j = np.nonzero(~outside & (amplitude > ground + contrast))
+    middle, upper = np.quantile(amplitude[outside], [0.5, 0.75])
+    step = site.video.db_per_step
+    ground = min(max(upper - 3.01 / step, middle), middle + 12 / step)
+    i, j = np.nonzero(~outside & (amplitude > ground + contrast_db / step))
     azimuth = view.azimuth + i * site.video.azimuth_step_rad
     slant = view.range_m + j * site.video.range_step_m
     flat = np.sqrt(slant**2 - site.height**2)

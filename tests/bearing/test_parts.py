@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -178,10 +179,12 @@ def test_peaks_of_a_cross_are_its_two_lines() -> None:
 @pytest.mark.parametrize("weighted", [False, True])
 def test_moments_are_opencv_s(weighted: bool) -> None:
     one = view(0.9, range_m=700.0, seed=8)
-    contrast = 12 / VIDEO.db_per_step
-    echo = measured(one.amplitude, one.plot, grid_of(SITE, one.azimuth, one.range_m), 0.0, contrast, weighted=weighted)
+    step = VIDEO.db_per_step
+    echo = measured(
+        one.amplitude, one.plot, grid_of(SITE, one.azimuth, one.range_m), 0.0, 12.0, step, weighted=weighted
+    )
     assert echo is not None
-    east, north, above = naive.cells_of(one, SITE, contrast)
+    east, north, above = naive.cells_of(one, SITE, 12.0)
     # a fine raster of the cells' places is what OpenCV takes
     raster = np.zeros((1200, 1200), np.float32)
     steps = 0.1
@@ -199,8 +202,8 @@ def test_moments_are_opencv_s(weighted: bool) -> None:
 def test_the_beam_s_width_is_taken_out_of_the_moments() -> None:
     one = view(0.9, range_m=1200.0, seed=8)
     grid = grid_of(SITE, one.azimuth, one.range_m)
-    wide = measured(one.amplitude, one.plot, grid, VIDEO.beamwidth_rad, 40.0)
-    point = measured(one.amplitude, one.plot, grid, 0.0, 40.0)
+    wide = measured(one.amplitude, one.plot, grid, VIDEO.beamwidth_rad, 12.0, VIDEO.db_per_step)
+    point = measured(one.amplitude, one.plot, grid, 0.0, 12.0, VIDEO.db_per_step)
     assert wide is not None
     assert point is not None
     cross = wide.range_m * VIDEO.beamwidth_rad
@@ -232,3 +235,18 @@ def test_a_weak_echo_is_less_sure_than_a_strong_one() -> None:
 def test_parts_are_what_their_files_are_called() -> None:
     for name, kind in {"moments": Moments, "hough": Hough, "ml": MaximumLikelihood, "template": Template}.items():
         assert isinstance(build("bearing", name), kind)
+
+
+def test_a_taxiway_between_grass_is_not_seen_as_a_wing() -> None:
+    # the cells beside a strip are 8 dB brighter: ground, not echo
+    part = MaximumLikelihood()
+    state = part.start(SITE)
+    chance = np.random.default_rng(5)
+    for seed in range(4):
+        one = view(1.0 + seed, range_m=550.0, seed=seed, snr_db=25.0)
+        grass = np.zeros(one.amplitude.shape)
+        grass[:, : one.plot[2] + 3] = grass[:, one.plot[2] + one.plot[3] - 3 :] = 8.0
+        power = 60 + (grass + 10 * np.log10(chance.exponential(size=grass.shape)) + 2.51) / VIDEO.db_per_step
+        mixed = np.where(grass > 0, np.maximum(one.amplitude, power), one.amplitude)
+        made = part(replace(one, amplitude=np.clip(mixed, 0, 255).astype(np.uint8)), None, state)
+        assert abs(axis_error(made.bearing, 1.0 + seed)) < 6
