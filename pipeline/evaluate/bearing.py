@@ -148,19 +148,16 @@ class BearingExperiment:
 
     def _wanted(self, error: Errors, scaled: Errors, far: NDArray[np.bool_], at: dict[str, int]) -> list[Row]:
         kind, m = self.types[0], at["ml"]
-        prior, square = error[:, m, 1, 0], np.square(_given(scaled[:, m, 1]))
+        prior = error[:, m, 1, 0]
         name = f"ml, {kind}, expected heading"
+        square = np.square(scaled[:, m])
         return [
             *_rms_row(f"ml, {kind}, 400 m and more: all-trials rms", error[:, m, 0, 0][:, far], 3.5),
             *_rms_row(f"{name}: all-trials rms", prior, 2.0),
             *_gross_row(f"{name}: gross errors", prior, 0.0),
-            *(
-                [Row("ml, expected heading: mean square of error over its sd", float(square.mean()),
-                     *mean_interval(square), "")]
-                if len(square)
-                else []
-            ),
-        ]  # fmt: skip
+            *_square_row("ml: mean square of core error over its sd", square[:, 0], error[:, m, 0]),
+            *_square_row("ml, expected heading: mean square of core error over its sd", square[:, 1], error[:, m, 1]),
+        ]
 
     def figures(self, results: Sequence[Trial]) -> tuple[Figure, ...]:
         """Error against range for each method and type, and an example with the axes that were found."""
@@ -301,6 +298,11 @@ def _gross_row(name: str, error: Errors, wanted: float | None = None) -> list[Ro
         return []
     gross = len(given) - len(_core(error))
     return [Row(name, 100 * gross / len(given), *_percent(gross, len(given)), "%", better="lower", wanted=wanted)]
+
+
+def _square_row(name: str, square: Errors, error: Errors) -> list[Row]:
+    core = square[np.abs(error) < CORE_DEG]
+    return [Row(name, float(core.mean()), *mean_interval(core), "")] if len(core) else []
 
 
 def _without(name: str, error: Errors, asked: NDArray[np.bool_]) -> list[Row]:
