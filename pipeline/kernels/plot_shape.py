@@ -210,7 +210,7 @@ def measure_plot(root: int, newest: int, runs: Any, turn: Any, geometry: Any, ou
     east, north, height, step, azimuth_step, beam, azimuths, _ = constants
     wide, wide_int, narrow, narrow_int, covariance, window = out
     grid_rows = np.int64(azimuths)
-    total, seeds, amplitude, peak, low = np.int64(0), np.int64(0), np.int64(0), np.int64(0), np.int64(255)
+    total, amplitude, peak, low = np.int64(0), np.int64(0), np.int64(0), np.int64(255)
     first_cell, last_cell = np.int64(runs[root].start), np.int64(runs[root].end)
     first_row = np.int64(runs[root].row)
     rows = (np.int64(runs[root].last) - first_row) % grid_rows + 1
@@ -223,7 +223,6 @@ def measure_plot(root: int, newest: int, runs: Any, turn: Any, geometry: Any, ou
         row = np.int64(one.row)
         n = b - a
         total += n
-        seeds += np.int64(one.seeds)
         amplitude += np.int64(one.total)
         peak = max(peak, np.int64(one.peak))
         low = min(low, np.int64(one.low))
@@ -309,7 +308,7 @@ def measure_plot(root: int, newest: int, runs: Any, turn: Any, geometry: Any, ou
     narrow[5, at] = peak
     narrow[6, at] = bearing
     narrow[7, at] = deviation
-    narrow_int[8, at] = seeds
+    narrow_int[8, at] = runs[root].seeds
     window[at, 0] = first_row
     window[at, 1] = rows
     window[at, 2] = first_cell
