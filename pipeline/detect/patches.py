@@ -142,7 +142,8 @@ def _kinds(surface: NDArray[np.uint8]) -> NDArray[np.int64]:
     least = minimum_filter(surface, size=3, mode=("wrap", "nearest")).astype(np.int64)
     most = maximum_filter(surface, size=3, mode=("wrap", "nearest")).astype(np.int64)
     low, high = _per_tile(least, np.minimum, 255), _per_tile(most, np.maximum, 0)
-    built = _per_tile((surface == BUILDING).astype(np.int64), np.maximum, 0) > 0
+    walls = maximum_filter(surface == BUILDING, size=3, mode=("wrap", "nearest"))
+    built = _per_tile(walls.astype(np.int64), np.maximum, 0) > 0
     return np.where(low == high, low, MIXED + np.where(built, BUILDING, GRASS))
 
 
