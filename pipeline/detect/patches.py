@@ -134,7 +134,8 @@ def _paved(video: VideoFormat, surface: NDArray[np.uint8]) -> NDArray[np.uint64]
 
 def _inner(surface: NDArray[np.uint8]) -> NDArray[np.bool_]:
     soft = (surface == GRASS) | (surface == BUILDING)
-    return ~np.asarray(maximum_filter(soft, size=3, mode=("wrap", "nearest")))
+    # nobody knows what lies past the last cell
+    return ~np.asarray(maximum_filter(soft, size=3, mode=("wrap", "constant"), cval=1))
 
 
 def _kinds(surface: NDArray[np.uint8]) -> NDArray[np.int64]:
