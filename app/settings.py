@@ -92,7 +92,7 @@ class PartsSettings(Section):
 
     detect: PartSettings = PartSettings(name="adaptive")
     extract: PartSettings = PartSettings(name="manhattan")
-    bearing: PartSettings = PartSettings(name="ml")
+    bearing: PartSettings = PartSettings(name="moments")
     associate: PartSettings = PartSettings(name="gnn")
     filter: PartSettings = PartSettings(name="kalman")
     lifecycle: PartSettings = PartSettings(name="score")
