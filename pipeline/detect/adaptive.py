@@ -135,7 +135,7 @@ class Adaptive:
 
     pfa: float = 1e-6
     macro_cell_m: float = 100.0
-    level_scans: float = 1.5
+    level_scans: float = 1.0
     calm_scans: float = 4.0
     offset_scans: int = 64
     spread_scans: float = 12.0
