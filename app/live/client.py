@@ -5,14 +5,11 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import Awaitable, Callable
-from typing import TYPE_CHECKING
 
+from app.live.hub import Hub
 from app.live.messages import DEFAULT_RATE_HZ, Resume, Subscribe, granted_rate, track_filter
 from app.live.stream import View
 from app.wire import Row, encode
-
-if TYPE_CHECKING:
-    from app.live.hub import Hub
 
 REPLIES = 64
 """Answers that may wait for a client; one that asks more without reading is closed."""

@@ -9,10 +9,9 @@ import secrets
 import threading
 import time
 from collections import Counter, deque
-from typing import Any
+from typing import Any, Protocol
 
 from app.contract import Service
-from app.live.client import Client
 from app.live.messages import Resume
 from app.live.stream import Stream, TrackFilter, View
 from app.settings import Settings
@@ -28,6 +27,29 @@ WAITING_CHANGES = 10_000
 """Alert changes kept before the event loop has started."""
 
 
+class Follower(Protocol):
+    """What the hub asks of a client. waiting_since: loop time at which the frame being written was begun, or None."""
+
+    topics: frozenset[str]
+    rate_hz: float
+    waiting_since: float | None
+
+    def due(self) -> None:
+        """The client's rate allows a delta."""
+
+    def alert(self, text: str) -> None:
+        """Queue an alert message."""
+
+    def begin_again(self) -> None:
+        """The epoch changed."""
+
+    def wake(self) -> None:
+        """There is something to look at."""
+
+    def end(self, code: int, reason: str) -> None:
+        """Have the connection closed."""
+
+
 class Hub:
     """One stream of pictures and alerts with `epoch` and `seq`, shared by all clients.
 
@@ -39,7 +61,7 @@ class Hub:
         self.wire = Wire(service.airport, settings.mode)
         self.epoch = secrets.token_hex(4)
         self.seq = 0
-        self.clients: set[Client] = set()
+        self.clients: set[Follower] = set()
         self.counters: Counter[str] = Counter()
         self.picture: Picture | None = None
         self.picture_seq = 0
