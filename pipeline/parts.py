@@ -15,6 +15,9 @@ from functools import cache
 from types import NoneType, UnionType
 from typing import Any, get_args, get_type_hints
 
+MOST = 2.0**53
+"""No number among the settings is greater: up to here whole numbers and floating point are the same."""
+
 VERBS = ("detect", "extract", "bearing", "associate", "filter", "lifecycle", "classify", "alert")
 """The folders of `pipeline` that hold parts."""
 
@@ -54,12 +57,13 @@ def build(verb: str, name: str, settings: Mapping[str, Any] | None = None) -> An
         given[key] = _of_type(value, kinds[key], f"{verb} part {name!r}: {key}")
     try:
         return kind(**given)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise PartError(f"{verb} part {name!r}: {error}") from error
 
 
 def _of_type(value: Any, wanted: Any, what: str) -> Any:
     """The value, where its type is a plain one: an integer also serves as a number. Raises PartError."""
+    _check_numbers(value, what)
     kinds = get_args(wanted) if isinstance(wanted, UnionType) else (wanted,)
     if not set(kinds) <= {bool, int, float, str, NoneType} or type(value) in kinds:
         return value
@@ -67,6 +71,15 @@ def _of_type(value: Any, wanted: Any, what: str) -> Any:
         return float(value)
     names = " or ".join("none" if kind is NoneType else kind.__name__ for kind in kinds)
     raise PartError(f"{what} must be {names}, not {value!r}")
+
+
+def _check_numbers(value: Any, what: str) -> None:
+    """Raises PartError for a number that is not finite, or so large that no setting means it."""
+    if isinstance(value, list | tuple):
+        for one in value:
+            _check_numbers(one, what)
+    elif isinstance(value, int | float) and not -MOST <= value <= MOST:
+        raise PartError(f"{what} must be a finite number, {MOST:.0e} at most")
 
 
 def _nearest(word: str, among: Any) -> str:

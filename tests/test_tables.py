@@ -57,6 +57,13 @@ def test_sweeps_ascend() -> None:
         Sweeps(0, 0, np.array([2, 1], np.int32), np.zeros(2), np.zeros(2), np.zeros((2, 8), np.uint8))
 
 
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), 10**400, -(2**60), [0.0, float("nan")], "ten"])
+def test_no_setting_takes_a_number_that_is_none(value: object) -> None:
+    for verb, name, setting in (("detect", "adaptive", "most_offset_db"), ("extract", "manhattan", "ring_m")):
+        with pytest.raises(PartError, match=name):
+            build(verb, name, {setting: value})
+
+
 def test_an_unknown_part_names_the_nearest() -> None:
     with pytest.raises(PartError, match="detect"):
         available("detekt")

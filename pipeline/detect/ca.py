@@ -66,8 +66,8 @@ class CellAveraging:
         check_pfa(self.pfa)
         if self.domain not in get_args(Domain):
             raise ValueError(f"domain must be one of {', '.join(get_args(Domain))}")
-        check_whole(side=self.side, max_runs=self.max_runs)
-        check_whole(0, guard=self.guard, sweeps=self.sweeps, guard_sweeps=self.guard_sweeps)
+        check_whole(max_runs=self.max_runs)
+        _ = self.window
 
     @property
     def window(self) -> Window:
@@ -80,7 +80,7 @@ class CellAveraging:
         """The state before the first sweep. surface is not used."""
         check_start(video, surface, growth_db)
         step = video.db_per_step
-        independent = np.floor(self.window.independent(video)).astype(int)
+        independent = np.floor(self.window.independent(video) + 1e-9).astype(int)
         offsets = power_mean_offsets_db if self.domain == "power" else mean_offsets_db
 
         def above(pfa: float) -> NDArray[np.float64]:

@@ -181,7 +181,8 @@ def _recursive_weights(heard: int, memory: int) -> tuple[NDArray[np.float64], ND
     edges = np.unique(np.linspace(0, later, min(later, 128) + 1).astype(int))
     kept = (1 - 1 / memory) ** edges
     many = np.append(np.diff(edges).astype(float), memory)
-    return np.append(-np.diff(kept), kept[-1]) / many, many
+    weights = np.append(-np.diff(kept), kept[-1]) / many
+    return weights[weights > 0], many[weights > 0]
 
 
 def censored_bias_db(limit_db: float, freeze_db: float) -> float:

@@ -9,11 +9,14 @@ from numpy.typing import NDArray
 
 from pipeline.tables import VideoFormat
 
+LEAST_PFA = 1e-15
+"""A year of a radar has fewer cells than false alarms of this probability need."""
+
 
 def check_pfa(pfa: float) -> None:
-    """Raises ValueError for a false alarm probability outside (0, 0.5)."""
-    if not 0 < pfa < 0.5:
-        raise ValueError("pfa must lie between 0 and 0.5")
+    """Raises ValueError for a false alarm probability below LEAST_PFA or not below 0.5."""
+    if not LEAST_PFA <= pfa < 0.5:
+        raise ValueError(f"pfa must lie between 0 ({LEAST_PFA:g} at least) and 0.5")
 
 
 def check_positive(**settings: float) -> None:
@@ -23,11 +26,16 @@ def check_positive(**settings: float) -> None:
             raise ValueError(f"{name} must be greater than 0")
 
 
-def check_whole(least: int = 1, **settings: int) -> None:
-    """Raises ValueError, with its name, for a setting that is no whole number or less than `least`."""
+MOST_WHOLE = 2**53
+"""The greatest whole number that a floating point number holds."""
+
+
+def check_whole(least: int = 1, most: int = MOST_WHOLE, **settings: int) -> None:
+    """Raises ValueError, with its name, for a setting that is no whole number, less than `least` or above `most`."""
     for name, value in settings.items():
-        if value != int(value) or value < least:
-            raise ValueError(f"{name} must be a whole number, {least} or more")
+        if not (least <= value <= most and value == int(value)):
+            bounds = f"{least} or more" if most == MOST_WHOLE else f"{least} to {most}"
+            raise ValueError(f"{name} must be a whole number, {bounds}")
 
 
 def check_start(video: VideoFormat, surface: NDArray[np.uint8] | None, growth_db: float | None) -> None:

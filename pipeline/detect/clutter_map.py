@@ -62,9 +62,9 @@ class ClutterMapState(ArrayState):
     degraded_sweeps: NDArray[np.int64] = remembered()
 
     def refuse_untrue(self, saved: Mapping[str, NDArray[Any]]) -> None:
-        """Raise StateError for sweeps heard less than never."""
-        if (saved["heard"] < 0).any():
-            raise StateError("heard: less than 0 sweeps")
+        """Raise StateError for sweeps heard less than never, or more than any radar lives to turn."""
+        if not ((saved["heard"] >= 0) & (saved["heard"] < 2**48)).all():
+            raise StateError("heard: numbers of sweeps that cannot be true")
 
     @property
     def counters(self) -> dict[str, int]:
@@ -85,7 +85,7 @@ class ClutterMap:
     the mean alone where the cell is detected, "both" does both. A frozen mean stays as long as the cell is detected:
     clutter that rises at once beyond the threshold (heavy rain) then stays detected, up to the cap on runs.
 
-    learn_scans: scans of a sweep before its cells detect anything. max_runs: as in `hybrid`.
+    learn_scans: scans of a sweep before its cells detect anything, up to 6 * memory. max_runs: as in `hybrid`.
     """
 
     pfa: float = 1e-6
@@ -98,9 +98,9 @@ class ClutterMap:
     def __post_init__(self) -> None:
         check_pfa(self.pfa)
         check_positive(limit_db=self.limit_db)
-        check_whole(memory=self.memory, learn_scans=self.learn_scans, max_runs=self.max_runs)
-        if self.memory > MOST_MEMORY:
-            raise ValueError(f"memory must be {MOST_MEMORY} or less")
+        check_whole(1, MOST_MEMORY, memory=self.memory)
+        check_whole(1, 6 * self.memory, learn_scans=self.learn_scans)
+        check_whole(max_runs=self.max_runs)
         if self.anti_masking not in get_args(AntiMasking):
             raise ValueError(f"anti_masking must be one of {', '.join(get_args(AntiMasking))}")
 
@@ -120,7 +120,7 @@ class ClutterMap:
             above=above,
             growth_above=np.minimum(grow, above),
             gain=np.rint(gain * (1 << GAIN_BITS)).astype(np.int32),
-            limit_units=round(self.limit_db / video.db_per_step * ONE) if limited else 256 * ONE,
+            limit_units=round(min(self.limit_db / video.db_per_step, 256) * ONE) if limited else 256 * ONE,
             tail=np.zeros(64, np.uint8),
             level=np.zeros((video.azimuths, video.ranges), np.uint16),
             heard=np.zeros(video.azimuths, np.int64),

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass
+from math import inf
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -16,8 +17,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.detect.calibration import estimation_loss_db, threshold_offset_db
-from pipeline.detect.checks import check_pfa, check_positive, check_start, check_whole
-from pipeline.detect.hybrid_map import HybridMapState, detect_in_map_cells
+from pipeline.detect.checks import check_pfa, check_start, check_whole
+from pipeline.detect.hybrid_map import HybridMapState, detect_in_map_cells, refuse_untrue_levels
 from pipeline.detect.limits import limits_used
 from pipeline.detect.macro_cells import STRIPE_ROWS, MacroCells, MapCells
 from pipeline.kernels.bits import add_pairs, bits_above, borrowed, compare_and_add_four, count_runs
@@ -60,9 +61,10 @@ class HybridState(ArrayState):
     degraded_sweeps: NDArray[np.int64] = remembered()
 
     def refuse_untrue(self, saved: Mapping[str, NDArray[Any]]) -> None:
-        """Raise StateError when the macro-cell that is left next does not exist."""
+        """Raise StateError when the macro-cell that is left next does not exist, or for levels no video has."""
         if not 0 <= saved["cursor"][LEFT] < len(self.level):
             raise StateError("cursor: a macro-cell that does not exist")
+        refuse_untrue_levels(saved)
 
     @property
     def counters(self) -> dict[str, int]:
@@ -78,9 +80,9 @@ class Hybrid:
     itself. macro_cell_m: side of the (nearly square) macro-cells. cells: "square", or "map" to cut the squares by the
     kinds of surface of the airport map, small pieces put together with others of their kind. memory: scans of the
     recursive mean (feedback 1 - 1/memory); until then it is the plain mean of the scans seen. learn_scans: scans before
-    a macro-cell detects anything: with 1, the first scan only learns and scan 2 detects with the full Pd. max_runs: cap
-    on runs of detected cells a turn; above it the rows concerned get a higher threshold, just as high as needed
-    (`Detections.degraded`, counted).
+    a macro-cell detects anything, up to memory: with 1, the first scan only learns and scan 2 detects with the full Pd.
+    max_runs: cap on runs of detected cells a turn; above it the rows concerned get a higher threshold, just as high as
+    needed (`Detections.degraded`, counted).
 
     A macro-cell within the offset of full scale detects nothing; without any echo (level 0) the offset alone is the
     threshold. growth_db counts from the same mean; a degraded row grows nothing, so that a flood stays bounded.
@@ -95,10 +97,12 @@ class Hybrid:
 
     def __post_init__(self) -> None:
         check_pfa(self.pfa)
-        check_positive(macro_cell_m=self.macro_cell_m)
+        if not 1 <= self.macro_cell_m < inf:
+            raise ValueError("macro_cell_m must be 1 or more")
         if self.cells not in get_args(Cells):
             raise ValueError(f"cells must be one of {', '.join(get_args(Cells))}")
-        check_whole(memory=self.memory, learn_scans=self.learn_scans, max_runs=self.max_runs)
+        check_whole(memory=self.memory, max_runs=self.max_runs)
+        check_whole(1, self.memory, learn_scans=self.learn_scans)
 
     def start(
         self, video: VideoFormat, surface: NDArray[np.uint8] | None = None, growth_db: float | None = None

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pipeline.detect.macro_cells import MapCells
 from pipeline.kernels.bits import borrowed
 from pipeline.kernels.run_cap import detect_row
-from pipeline.state import ArrayState, remembered
+from pipeline.state import ArrayState, StateError, remembered
 
 
 @dataclass(eq=False, kw_only=True)
@@ -62,6 +62,10 @@ class HybridMapState(ArrayState):
         """degraded_sweeps: sweeps whose threshold was raised to stay under the cap on runs."""
         return {"degraded_sweeps": int(self.degraded_sweeps[0])}
 
+    def refuse_untrue(self, saved: Mapping[str, NDArray[Any]]) -> None:
+        """Raise StateError for levels no video has."""
+        refuse_untrue_levels(saved)
+
     def arrays(self) -> tuple[Any, ...]:
         """What the kernel works on."""
         return (
@@ -69,6 +73,12 @@ class HybridMapState(ArrayState):
             (self.level, self.weight, self.limit, self.growth_limit, self.sums, self.heard),
             (self.scan, self.threshold, self.growth, self.budget, self.degraded_sweeps, self.tail),
         )
+
+
+def refuse_untrue_levels(saved: Mapping[str, NDArray[Any]]) -> None:
+    """Raise StateError for levels that the mean of 8-bit amplitudes cannot have, and for weights below 0."""
+    if not ((saved["level"] > -1) & (saved["level"] < 256) & (saved["weight"] >= 0)).all():
+        raise StateError("levels or weights that cannot be true")
 
 
 @njit(nogil=True, cache=True)

@@ -61,8 +61,8 @@ class OrderedStatistic:
         check_pfa(self.pfa)
         if not 0 < self.rank <= 1:
             raise ValueError("rank must lie above 0 and not above 1")
-        check_whole(side=self.side, max_runs=self.max_runs)
-        check_whole(0, guard=self.guard, sweeps=self.sweeps, guard_sweeps=self.guard_sweeps)
+        check_whole(max_runs=self.max_runs)
+        _ = self.window
 
     @property
     def window(self) -> Window:

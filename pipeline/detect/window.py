@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.detect.checks import check_whole
 from pipeline.kernels.run_cap import CapSettings
 from pipeline.state import ArrayState, remembered
 from pipeline.tables import VideoFormat
@@ -19,16 +20,25 @@ BEYOND = 600.0
 NEVER = -(2**62)
 """A row that no sweep looks back to."""
 
+MOST_CELLS, MOST_SWEEPS = 1024, 64
+"""The largest window: its tables grow with the square of the sweeps."""
+
 
 @dataclass(frozen=True)
 class Window:
     """side: cells on either side beyond `guard` cells. sweeps: how many rows the window reaches back (0: its own sweep
-    only); of the nearest `guard_sweeps` rows only the cells beyond the guard cells belong to it."""
+    only); of the nearest `guard_sweeps` rows only the cells beyond the guard cells belong to it. Raises ValueError for
+    one that is out of bounds, with its name."""
 
     side: int
     guard: int
     sweeps: int
     guard_sweeps: int
+
+    def __post_init__(self) -> None:
+        check_whole(1, MOST_CELLS, side=self.side)
+        check_whole(0, MOST_CELLS, guard=self.guard)
+        check_whole(0, MOST_SWEEPS, sweeps=self.sweeps, guard_sweeps=self.guard_sweeps)
 
     @property
     def near(self) -> int:

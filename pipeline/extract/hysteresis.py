@@ -10,9 +10,11 @@ plot near the radar and far from it, and two cars are two.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
+from pipeline.kernels.component_state import MOST_OPEN_RUNS
 from pipeline.kernels.growth import GrowthState, GrowthWindow, flush_grown, take_grown_block
 from pipeline.kernels.links import LinkRule
 from pipeline.sites import RadarSite
@@ -43,10 +45,10 @@ class Hysteresis:
     def __post_init__(self) -> None:
         if not 0 < self.growth_db < 40:
             raise ValueError("growth_db must lie between 0 and 40")
-        if not self.window_m > 0 or not 1 <= self.most_rows <= 64:
+        if not 0 < self.window_m < inf or not 1 <= self.most_rows <= 64:
             raise ValueError("window_m must be greater than 0, most_rows 1 to 64")
-        if self.min_cells < 1 or self.max_open_runs < 16 or self.max_grown_runs < 1:
-            raise ValueError("min_cells and max_grown_runs must be 1 or more, max_open_runs 16 or more")
+        if min(self.min_cells, self.max_grown_runs) < 1 or not 16 <= self.max_open_runs <= MOST_OPEN_RUNS:
+            raise ValueError(f"min_cells and max_grown_runs must be 1 or more, max_open_runs 16 to {MOST_OPEN_RUNS}")
         if not 0 < self.max_extent_turn <= 0.5:
             raise ValueError("max_extent_turn must lie above 0 and not above 0.5")
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.kernels.component_state import ComponentState
+from pipeline.kernels.component_state import MOST_OPEN_RUNS, ComponentState
 from pipeline.kernels.components import flush, take_block
 from pipeline.kernels.links import LinkRule
 from pipeline.sites import RadarSite
@@ -39,7 +39,7 @@ class Manhattan:
         object.__setattr__(self, "reach", tuple(int(one) for one in self.reach))
         if not self.ring_m or len(self.ring_m) != len(self.reach):
             raise ValueError("ring_m and reach must be of one length")
-        if self.ring_m[0] != 0 or any(b <= a for a, b in zip(self.ring_m, self.ring_m[1:], strict=False)):
+        if self.ring_m[0] != 0 or any(not b > a for a, b in zip(self.ring_m, self.ring_m[1:], strict=False)):
             raise ValueError("ring_m must begin with 0 and rise")
         if (
             self.reach[-1] < 1
@@ -47,8 +47,8 @@ class Manhattan:
             or any(b > a for a, b in zip(self.reach, self.reach[1:], strict=False))
         ):
             raise ValueError("reach must fall from at most 64 to at least 1")
-        if self.min_cells < 1 or self.max_open_runs < 16:
-            raise ValueError("min_cells must be 1 or more, max_open_runs 16 or more")
+        if self.min_cells < 1 or not 16 <= self.max_open_runs <= MOST_OPEN_RUNS:
+            raise ValueError(f"min_cells must be 1 or more, max_open_runs 16 to {MOST_OPEN_RUNS}")
         if not 0 < self.max_extent_turn <= 0.5:
             raise ValueError("max_extent_turn must lie above 0 and not above 0.5")
 

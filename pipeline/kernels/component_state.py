@@ -19,6 +19,9 @@ NEWEST, LATEST, RETIRED, HEAD, TAIL, DROPPED, CUT, SMALL, SEEDLESS, CELLS, TAKEN
 """Places in `ComponentState.numbers`: newest row, newest row with runs, row up to which all are retired, first free
 place and oldest open run of the pool, and counts; TAKEN: steps of the present block that are done."""
 
+MOST_OPEN_RUNS = 1 << 20
+"""More would be a gigabyte where a part is changed and its state saved."""
+
 MOVE = 512
 """Delivered runs at the beginning of the pool that are worth moving the others down for."""
 

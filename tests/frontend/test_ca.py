@@ -117,7 +117,20 @@ def test_the_first_scan_detects_already() -> None:
 
 
 @pytest.mark.parametrize(
-    "setting", [{"pfa": 0.6}, {"domain": "amplitude"}, {"side": 0}, {"guard": -1}, {"sweeps": -1}, {"max_runs": 0}]
+    "setting",
+    [
+        {"pfa": 0.6},
+        {"pfa": 1e-320},
+        {"domain": "amplitude"},
+        {"side": 0},
+        {"side": 10**9},
+        {"guard": -1},
+        {"guard": 10**20},
+        {"sweeps": -1},
+        {"sweeps": 1000, "guard_sweeps": 500},
+        {"max_runs": 0},
+        {"max_runs": 10**400},
+    ],
 )
 def test_wrong_settings_are_refused(setting: dict[str, Any]) -> None:
     with pytest.raises(PartError):

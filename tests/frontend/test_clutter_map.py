@@ -12,6 +12,7 @@ from scipy.stats import binom
 from pipeline.detect import Detector
 from pipeline.detect.clutter_map import ClutterMap
 from pipeline.parts import PartError, build
+from pipeline.state import StateError
 from pipeline.tables import VideoFormat
 from tests.frontend.contracts import DetectorContract, busy_video
 from tests.frontend.naive_detect import clutter_map_limits
@@ -140,8 +141,46 @@ def test_the_first_scan_only_learns_and_missing_sweeps_do_not_age_the_map() -> N
 
 
 @pytest.mark.parametrize(
-    "setting", [{"pfa": 0.0}, {"memory": 0}, {"memory": 5000}, {"anti_masking": "some"}, {"limit_db": 0.0}]
+    "setting",
+    [
+        {"pfa": 0.0},
+        {"memory": 0},
+        {"memory": 5000},
+        {"memory": 2, "learn_scans": 13},
+        {"anti_masking": "some"},
+        {"limit_db": 0.0},
+    ],
 )
 def test_wrong_settings_are_refused(setting: dict[str, Any]) -> None:
     with pytest.raises(PartError):
         build("detect", "clutter_map", setting)
+
+
+@pytest.mark.parametrize("setting", [{"memory": 1, "pfa": 1e-4}, {"memory": 2, "learn_scans": 12}])
+def test_the_shortest_memories_detect(setting: dict[str, Any]) -> None:
+    frames = rayleigh(np.random.default_rng(5), (14, SMALL.azimuths, SMALL.ranges), 25.0)
+    frames[13, 4, 30] = 255
+    part = ClutterMap(**setting)
+    state = part.start(SMALL)
+    found = [part(block, state).cells(SMALL.ranges) for block in strip(frames, SMALL)]
+    assert found[13][4, 30]
+
+
+def test_a_limit_beyond_full_scale_is_none() -> None:
+    blocks = strip(busy_video(SMALL, 20), SMALL)
+    states = []
+    for part in (ClutterMap(anti_masking="limit", limit_db=1e12), ClutterMap()):
+        state = part.start(SMALL)
+        for block in blocks:
+            part(block, state)
+        states.append(state)
+    np.testing.assert_array_equal(states[0].level, states[1].level)
+
+
+@pytest.mark.parametrize("heard", [-1, 2**63 - 1])
+def test_a_saved_state_that_cannot_be_true_is_refused(heard: int) -> None:
+    state = ClutterMap().start(SMALL)
+    saved = state.save()
+    saved["heard"][3] = heard
+    with pytest.raises(StateError):
+        state.restore(saved)

@@ -13,6 +13,7 @@ from pipeline.detect.calibration import false_alarm_probability, threshold_offse
 from pipeline.detect.hybrid import Hybrid, HybridState
 from pipeline.detect.macro_cells import FEWEST, MacroCells, MapCells, map_labels
 from pipeline.parts import PartError, build
+from pipeline.state import StateError
 from pipeline.tables import VideoFormat
 from tests.frontend.contracts import DetectorContract, busy_video, mask_of
 from tests.frontend.naive import hybrid_masks, square_labels
@@ -238,8 +239,31 @@ def test_the_first_scan_only_learns() -> None:
 
 
 @pytest.mark.parametrize(
-    "setting", [{"pfa": 0.0}, {"pfa": 1.0}, {"memory": 0}, {"macro_cell_m": -1.0}, {"max_runs": 0}, {"cells": "round"}]
+    "setting",
+    [
+        {"pfa": 0.0},
+        {"pfa": 1e-320},
+        {"pfa": 1.0},
+        {"memory": 0},
+        {"memory": 4, "learn_scans": 5},
+        {"macro_cell_m": -1.0},
+        {"macro_cell_m": 1e-9},
+        {"macro_cell_m": 1e300},
+        {"max_runs": 0},
+        {"cells": "round"},
+    ],
 )
 def test_wrong_settings_are_refused(setting: dict[str, Any]) -> None:
     with pytest.raises(PartError):
         build("detect", "hybrid", setting)
+
+
+@pytest.mark.parametrize("cells", ["square", "map"])
+@pytest.mark.parametrize(("name", "value"), [("level", -1e308), ("level", 300.0), ("level", np.nan), ("weight", -1.0)])
+def test_a_saved_state_that_cannot_be_true_is_refused(cells: Any, name: str, value: float) -> None:
+    state = Hybrid(cells=cells).start(SMALL)
+    saved = state.save()
+    state.restore(saved)
+    saved[name][0] = value
+    with pytest.raises(StateError):
+        state.restore(saved)

@@ -209,6 +209,8 @@ def test_the_chain_asks_the_detector_for_growth(detector: str) -> None:
     [
         {"growth_db": 0.0},
         {"window_m": 0.0},
+        {"window_m": float("inf")},
+        {"max_open_runs": 10**8},
         {"most_rows": 0},
         {"most_rows": 65},
         {"min_cells": 0},

@@ -115,7 +115,10 @@ def test_a_second_target_in_the_window_does_not_mask_the_first() -> None:
     assert not power(strip(frame, video)[0], power.start(video)).cells(200)[10, 100]
 
 
-@pytest.mark.parametrize("setting", [{"pfa": 0.6}, {"rank": 0.0}, {"rank": 1.1}, {"side": 0}, {"guard": -1}])
+@pytest.mark.parametrize(
+    "setting",
+    [{"pfa": 0.6}, {"rank": 0.0}, {"rank": 1.1}, {"side": 0}, {"side": 2000}, {"guard": -1}, {"sweeps": 65}],
+)
 def test_wrong_settings_are_refused(setting: dict[str, Any]) -> None:
     with pytest.raises(PartError):
         build("detect", "os", setting)
