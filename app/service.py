@@ -12,6 +12,7 @@ from app.assembly import FRONT_END, build_parts, chain_of, check_parts, node_sit
 from app.contract import FrontEnd, PictureListener, Readiness, Refused, UnknownId, Video
 from app.ingest.octets import OctetIntake
 from app.ingest.udp import VideoReceiver
+from app.runtime.compile_apart import CompilerApart
 from app.runtime.front_end import FrontEndSwitch
 from app.runtime.radar_worker import RadarWorker
 from app.runtime.state_keeper import StateKeeper
@@ -49,6 +50,7 @@ class SurfaceService:
         self.keep_node_events: Callable[[NodeEvents], None] = lambda events: None
         self._workers: dict[str, RadarWorker] = {}
         self._switches: dict[str, FrontEndSwitch] = {}
+        self._compiler = CompilerApart()
         self._keeper = StateKeeper(
             settings.data_dir / "state",
             _scene(settings),
@@ -83,7 +85,7 @@ class SurfaceService:
             if resume:
                 self._keeper.take_up(chain)
             worker = RadarWorker(site, chain, self.settings.limits.blocks_queued, self._surface.inbox.offer)
-            self._switches[site.id] = FrontEndSwitch(worker, index, ground)
+            self._switches[site.id] = FrontEndSwitch(worker, index, ground, self._compiler)
             self._workers[site.id] = worker
             if radar.udp is not None:
                 self._receivers[site.id] = VideoReceiver(site, index, radar, worker.put)
@@ -102,6 +104,7 @@ class SurfaceService:
 
     def stop(self) -> None:
         """Close the sockets, work off what waits, end the threads."""
+        self._compiler.stop()
         for receiver in self._receivers.values():
             receiver.stop()
         for worker in self._workers.values():

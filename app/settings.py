@@ -148,7 +148,9 @@ class StorageSettings(Section):
 
     retention_days: float = Field(30.0, gt=0)
     point_interval_s: float = Field(1.0, ge=0, description="at most one stored point of a track in this time")
-    state_interval_s: float = Field(60.0, gt=0, description="how often what the detectors have learned is saved")
+    state_interval_s: float = Field(
+        60.0, gt=0, le=86400, description="how often what the detectors have learned is saved"
+    )
     state_max_age_s: float = Field(
         3600.0, ge=0, description="a detector takes up what it had learned when it is not older than this; 0: never"
     )

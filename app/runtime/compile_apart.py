@@ -11,10 +11,12 @@ import logging
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
+import threading
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from app.assembly import FRONT_END, chain_of
+from app.contract import Refused
 from pipeline import parts
 from pipeline.sites import RadarSite
 from pipeline.tables import VideoFormat
@@ -23,32 +25,65 @@ log = logging.getLogger(__name__)
 
 LIMIT_S = 300.0
 
-_known: set[str] = set()
 
+class CompilerApart:
+    """Starts that process, once for each combination of parts, and ends it with the service. Any thread may call.
 
-def compile_apart(chosen: Mapping[str, Mapping[str, Any]]) -> None:
-    """Compile what these parts need, once for each combination. Never raises: what fails is compiled here later.
-
-    chosen: of each verb its name and settings, as JSON could carry them.
+    command: of the process.
     """
-    # numbers do not change what is compiled
-    key = json.dumps({verb: [v for v in one.values() if isinstance(v, str | bool)] for verb, one in chosen.items()})
-    if key in _known:
-        return
-    try:
-        done = subprocess.run(
-            [sys.executable, "-m", __name__],
-            input=json.dumps(chosen),
-            capture_output=True,
-            text=True,
-            timeout=LIMIT_S,
-            check=False,
-        )
-        if done.returncode:
-            log.warning("the kernels were not compiled apart: %s", done.stderr.strip()[-500:])
-    except (OSError, subprocess.SubprocessError) as error:
-        log.warning("the kernels were not compiled apart: %s", error)
-    _known.add(key)
+
+    def __init__(self, command: Sequence[str] = (sys.executable, "-m", __name__)) -> None:
+        self._command = command
+        self._known: set[str] = set()
+        self._running: set[subprocess.Popen[str]] = set()
+        self._lock = threading.Lock()
+        self._over = False
+
+    def __call__(self, chosen: Mapping[str, Mapping[str, Any]]) -> None:
+        """Compile what these parts need. What fails is compiled here later. Raises Refused when the service ends.
+
+        chosen: of each verb its name and settings, as JSON could carry them.
+        """
+        # numbers do not change what is compiled
+        key = json.dumps({verb: [v for v in one.values() if isinstance(v, str | bool)] for verb, one in chosen.items()})
+        if key not in self._known:
+            told = self._run(json.dumps(chosen))
+            if told:
+                log.warning("the kernels were not compiled apart: %s", told)
+            self._known.add(key)
+        if self._over:
+            raise Refused("the service ends")
+
+    def stop(self) -> None:
+        """End what compiles, and compile no more."""
+        with self._lock:
+            self._over = True
+            for process in self._running:
+                process.kill()
+
+    def _run(self, chosen: str) -> str:
+        """Why it failed, in words; empty when it did not."""
+        pipe = subprocess.PIPE
+        with self._lock:
+            if self._over:
+                return ""
+            try:
+                process = subprocess.Popen(
+                    self._command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, errors="replace"
+                )
+            except OSError as error:
+                return str(error)
+            self._running.add(process)
+        try:
+            _, told = process.communicate(chosen, timeout=LIMIT_S)
+        except (OSError, subprocess.SubprocessError) as error:
+            process.kill()
+            process.communicate()
+            return str(error)
+        finally:
+            with self._lock:
+                self._running.discard(process)
+        return "" if self._over or not process.returncode else told.strip()[-500:] or f"exit {process.returncode}"
 
 
 def main() -> None:

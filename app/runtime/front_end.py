@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from app.assembly import FRONT_END, chain_of, parts_of
 from app.contract import FrontEnd, Refused, WrongParts
-from app.runtime.compile_apart import compile_apart
 from app.runtime.radar_worker import RadarWorker
 from pipeline import catalogue, parts
 from pipeline.chain import RadarChain
@@ -24,6 +23,9 @@ log = logging.getLogger(__name__)
 
 BUSY_S = 60.0
 """How long a change waits for another that is being compiled."""
+
+MOST_CHANGES = 2
+"""One that is being made and one that waits; each holds a thread of those that answer all requests."""
 
 ANSWER_S = 2.0
 """A radar's thread is between two blocks well within this; a later answer still counts."""
@@ -41,7 +43,7 @@ class FrontEndSwitch:
         worker: RadarWorker,
         index: int,
         surface: NDArray[np.uint8] | None,
-        compile: Callable[[Mapping[str, Mapping[str, Any]]], None] = compile_apart,
+        compile: Callable[[Mapping[str, Mapping[str, Any]]], None],
     ) -> None:
         self._worker = worker
         self._index = index
@@ -49,6 +51,7 @@ class FrontEndSwitch:
         self._compile = compile
         self._next: dict[str, Any] | None = None
         self._changing = threading.Lock()
+        self._room = threading.BoundedSemaphore(MOST_CHANGES)
 
     @property
     def names(self) -> dict[str, str]:
@@ -82,14 +85,19 @@ class FrontEndSwitch:
     def choose(self, wanted: Mapping[str, Mapping[str, Any]]) -> FrontEnd:
         """Build and compile a chain with these parts, and have it take over. Raises WrongParts, Refused."""
         new = _built(wanted)
-        if not self._changing.acquire(timeout=BUSY_S):
-            raise Refused("another change of the parts is under way")
+        if not self._room.acquire(blocking=False):
+            raise Refused("other changes of the parts are under way")
         try:
-            running = parts_of(self._worker.chain)
-            made = {**(self._next or running), **new}
-            self._change(running, made)
+            if not self._changing.acquire(timeout=BUSY_S):
+                raise Refused("another change of the parts is under way")
+            try:
+                running = parts_of(self._worker.chain)
+                made = {**(self._next or running), **new}
+                self._change(running, made)
+            finally:
+                self._changing.release()
         finally:
-            self._changing.release()
+            self._room.release()
         return self.state()
 
     def _change(self, running: dict[str, Any], made: dict[str, Any]) -> None:

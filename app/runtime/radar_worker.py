@@ -33,13 +33,13 @@ class Turn:
 
 @dataclass
 class Successor:
-    """A chain that is to take over. done: told whether it did. learns_from: the scan with which it begins to learn
-    beside the running one; None before the first block. due: the scan with which it takes over."""
+    """A chain that is to take over. done: told whether it did. newest: the scan of the newest block since it waits;
+    None before the first. learned: scans in which it learned beside the running one; the rest of the first is none."""
 
     chain: RadarChain
     done: Callable[[bool], None]
-    learns_from: int | None = None
-    due: int | None = None
+    newest: int | None = None
+    learned: int = 0
 
 
 class RadarWorker:
@@ -188,13 +188,17 @@ class RadarWorker:
         successor = self._successor
         if successor is None or not len(block):
             return
-        if successor.learns_from is None or successor.due is None:
-            successor.learns_from = block.scan + 1
-            successor.due = successor.learns_from + successor.chain.scans_to_learn
-        self.scans_left = max(1, successor.due - max(block.scan, successor.learns_from))
-        if block.scan >= successor.due:
+        wanted = successor.chain.scans_to_learn
+        if successor.newest is None:
+            successor.newest = block.scan
+        elif block.scan > successor.newest and successor.learned == wanted:
             self._take_over(successor)
-        elif block.scan >= successor.learns_from:
+            return
+        elif block.scan > successor.newest:
+            # turns in which nothing was received teach nothing
+            successor.newest, successor.learned = block.scan, successor.learned + 1
+        self.scans_left = wanted - max(successor.learned - 1, 0)
+        if successor.learned:
             successor.chain.learn(block)
 
     def _take_over(self, successor: Successor | None) -> None:

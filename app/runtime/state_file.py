@@ -26,11 +26,15 @@ def write_state(path: Path, arrays: Mapping[str, NDArray[Any]], saved_at: float,
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f".{path.name}.new")
     kept = {**arrays, SAVED_AT: np.array(saved_at), SCENE: np.array(scene)}
-    with beside.open("wb") as file:
-        np.savez(file, allow_pickle=False, **kept)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(beside, path)
+    try:
+        with beside.open("wb") as file:
+            np.savez(file, allow_pickle=False, **kept)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(beside, path)
+    except BaseException:
+        beside.unlink(missing_ok=True)  # on a full disk the half of it takes the room of the next
+        raise
     folder = os.open(path.parent, os.O_RDONLY)
     try:
         os.fsync(folder)

@@ -110,6 +110,18 @@ def test_turns_to_go_are_counted_and_a_change_of_mind_is_heard(running: Running)
     assert isinstance(running.worker.chain.detector, Hybrid)
 
 
+def test_turns_that_were_not_received_teach_nothing(running: Running) -> None:
+    running.turns(0, 2)
+    told: list[bool] = []
+    successor = small_chain(Adaptive(learn_scans=3))
+    running.worker.succeed(successor, told.append)
+    running.turns(2, 4)
+    per_turn = [plots(running.turns(scan, scan + 1)) for scan in range(50, 55)]
+    assert min(per_turn[1:]) >= 3, "no turn without plots after the gap"
+    assert told == [True]
+    assert running.worker.chain is successor
+
+
 def test_a_successor_that_fails_leaves_the_running_one(running: Running) -> None:
     running.turns(0, 2)
     told: list[bool] = []

@@ -39,6 +39,17 @@ def test_what_is_written_is_read(path: Path) -> None:
     assert [one.name for one in path.parent.iterdir()] == [path.name], "nothing is left beside it"
 
 
+def test_what_could_not_be_written_leaves_nothing(path: Path) -> None:
+    class Full:
+        def __array__(self, *_: Any, **__: Any) -> Any:
+            raise OSError(28, "no room")
+
+    with pytest.raises(OSError, match="no room"):
+        write_state(path, {**ARRAYS, "full": Full()}, 995.0, "live")  # type: ignore[dict-item]
+    assert [one.name for one in path.parent.iterdir()] == [path.name]
+    assert set(read(path)) == set(ARRAYS)
+
+
 def test_too_old_another_scene_too_large_or_absent(path: Path) -> None:
     for how, words in (
         ({"now": 1051.0}, "61 s old"),
