@@ -9,7 +9,7 @@ from pathlib import Path
 from app.evaluate import plots, words
 from app.evaluate.circumstances import Circumstances
 from app.evaluate.gauge import gauge, key
-from app.evaluate.runs import Run
+from app.evaluate.runs import EvaluationError, Run
 from pipeline.evaluate import Figure, Row
 
 CHIPS = {
@@ -93,7 +93,7 @@ def _body(run: Run) -> str:
             f'<p class="reading"><b>Reading</b>{escape(run.experiment.reading)}</p>\n',
             _results(first, f"Results of {run.name}"),
             f"<details><summary>{more}</summary>\n{_results(others, more, long=True)}</details>\n" if others else "",
-            *(_figure(figure, f"{run.name}-{k}") for k, figure in enumerate(run.figures())),
+            _figures(run),
             f"<details><summary>Settings: {said}</summary>\n<dl>{listed}</dl></details>\n",
         )
     )
@@ -156,6 +156,14 @@ def _tiles(rows: Sequence[Row]) -> str:
         for kind, number, what in tiles
     )
     return f'<ul class="tiles">{listed}</ul>\n'
+
+
+def _figures(run: Run) -> str:
+    try:
+        made = run.figures()
+    except EvaluationError as error:
+        return f'<p class="left-out">{escape(str(error))}</p>\n'
+    return "".join(_figure(figure, f"{run.name}-{k}") for k, figure in enumerate(made))
 
 
 def _figure(figure: Figure, salt: str) -> str:

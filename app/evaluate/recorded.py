@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,7 @@ def recorded_video(path: Path) -> RecordedVideo:
         raise RecordingError(f"{path}: {error.strerror or error}") from error
     except Exception as error:  # zipfile and numpy's readers raise a dozen kinds on damaged files
         raise RecordingError(f"{path}: not a readable npz of scans and t ({error})") from error
-    if scans.dtype not in (np.uint8, np.uint16) or scans.ndim != 3 or not len(scans):
+    if scans.dtype not in (np.uint8, np.uint16) or scans.ndim != 3 or not scans.size:
         raise RecordingError(f"{path}: scans must be uint8 or uint16 of 3 dimensions, not {scans.dtype} {scans.shape}")
     if time.shape != (len(scans),) or time.dtype.kind not in "fiu":
         raise RecordingError(f"{path}: t must have one time for each of {len(scans)} scans")
@@ -42,7 +43,12 @@ def recorded_video(path: Path) -> RecordedVideo:
         raise RecordingError(f"{path}: bits says {bits}, but scans are {scans.dtype} up to {top}")
     video = video_format(path, (scans.shape[1], scans.shape[2]), usual, words)
     scans.flags.writeable = False
-    return RecordedVideo(scans, begin, bits, video.range_step_m, video.first_range_m, path.name)
+    return RecordedVideo(scans, begin, bits, video.range_step_m, video.first_range_m, name_of(path))
+
+
+def name_of(path: Path) -> str:
+    """The name of a file as text that can be written, whatever its octets are."""
+    return os.fsencode(path.name).decode("utf-8", "replace")
 
 
 def _bits(top: int, octets: int) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 from collections.abc import Sequence
@@ -15,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from app.evaluate.choose import ALL, choose
 from app.evaluate.circumstances import Circumstances, circumstances
 from app.evaluate.documents import document, json_text, markdown, write_whole
-from app.evaluate.recorded import recorded_video
+from app.evaluate.recorded import name_of, recorded_video
 from app.evaluate.runs import EvaluationError, Run, carry_out, usable_backend
 from app.evaluate.table import summary, told
 from pipeline.evaluate import Experiment
@@ -46,6 +47,8 @@ class Options:
                 raise ValueError(f"{path} is a folder; a file is wanted")
             if path is not None and not path.absolute().parent.is_dir():
                 raise ValueError(f"{path}: its folder does not exist")
+            if path is not None and not os.access(path.absolute().parent, os.W_OK):
+                raise ValueError(f"{path}: its folder cannot be written to")
         if self.report is not None and self.report.exists() and not self.report.is_dir():
             raise ValueError(f"--report {self.report}: is a file; a folder is wanted")
 
@@ -57,7 +60,7 @@ class Options:
         said += ["--jobs", str(self.jobs)] if self.jobs is not None else []
         said += ["--backend", self.backend] if self.backend != "loky" else []
         said += ["--quick"] if self.quick else []
-        said += ["--file", self.file.name] if self.file is not None else []
+        said += ["--file", name_of(self.file)] if self.file is not None else []
         return shlex.join(said)
 
 
@@ -86,13 +89,31 @@ def run_all(console: Console, options: Options) -> list[str]:
         try:
             runs.append(_with_progress(console, place + name, name, experiment, options))
         except EvaluationError as error:
-            print(error.details or "", f"airside: {error}", sep="\n" if error.details else "", file=sys.stderr)
-            failed.append(name)
+            failed.append(_explained(name, error))
             continue
         console.print(told(runs[-1]))
     if options.name == ALL:
         console.print(summary(runs))
     _write(console, options, runs, [*chosen.left_out, *(f"{name} failed" for name in failed)], about)
+    if options.report is not None:
+        failed += _without_figures(runs)
+    return failed
+
+
+def _explained(name: str, error: EvaluationError) -> str:
+    """The name, after what went wrong was told."""
+    print(error.details or "", f"airside: {error}", sep="\n" if error.details else "", file=sys.stderr)
+    return name
+
+
+def _without_figures(runs: Sequence[Run]) -> list[str]:
+    """The names of those whose figures could not be drawn; the page says so, and has the rest."""
+    failed = []
+    for run in runs:
+        try:
+            run.figures()
+        except EvaluationError as error:
+            failed.append(_explained(run.name, error))
     return failed
 
 

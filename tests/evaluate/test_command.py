@@ -176,6 +176,31 @@ def test_what_cannot_be_done_is_told_before_anything_runs(words: list[str], told
     assert "Traceback" not in result.output
 
 
+def test_a_folder_that_cannot_be_written_to_is_told_before_anything_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    result = evaluate("toy", "--json", "toy.json")
+    assert result.exit_code == 2
+    assert "cannot be written to" in result.stderr
+
+
+def test_figures_that_fail_cost_nothing_but_themselves(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    only_toys(monkeypatch, "toy", "undrawn")
+    result = evaluate("all", "--jobs", 1, "--report", tmp_path)
+    assert result.exit_code == 1
+    assert "could not be carried out: undrawn" in result.stderr
+    page = (tmp_path / "all.html").read_text(encoding="utf-8")
+    assert "undrawn: the figures failed: ValueError: no &lt;ink&gt;" in page
+    assert page.count("<figure>") == len(Toy().figures([]))
+
+
+def test_a_recording_may_have_any_name(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    only_toys(monkeypatch, "filmed")
+    path = recording(tmp_path / os.fsdecode(b"caf\xe9.npz"))
+    result = evaluate("filmed", "--jobs", 1, "--file", path, "--json", tmp_path / "a", "--markdown", tmp_path / "b")
+    assert result.exit_code == 0, result.stderr
+    assert read_strictly(tmp_path / "a")["settings"]["video"] == "caf\ufffd.npz"
+
+
 def test_a_recording_for_an_experiment_that_takes_none(tmp_path: Path) -> None:
     result = evaluate("toy", "--file", recording(tmp_path / "turns.npz"))
     assert result.exit_code == 2
@@ -234,6 +259,7 @@ def test_a_recording_is_handed_over_as_it_is(tmp_path: Path) -> None:
     ("more", "told"),
     [
         ({"scans": np.zeros((5, 64), np.uint8)}, "3 dimensions"),
+        ({"scans": np.zeros((5, 0, 0), np.uint8)}, "3 dimensions"),
         ({"scans": np.zeros((5, 64, 40), np.float32)}, "uint8 or uint16"),
         ({"t": np.arange(4.0)}, "one time for each"),
         ({"t": np.zeros(5)}, "steps back"),

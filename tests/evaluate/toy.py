@@ -85,6 +85,16 @@ class Failing(Toy):
 
 
 @dataclass(frozen=True)
+class Undrawn(Toy):
+    """Its figures fail."""
+
+    title: str = "Cannot be drawn"
+
+    def figures(self, results: Sequence[Trial]) -> tuple[Figure, ...]:
+        raise ValueError("no <ink>")
+
+
+@dataclass(frozen=True)
 class Dying(Toy):
     """Its process ends."""
 
@@ -136,6 +146,7 @@ TOYS: dict[str, type[Any]] = {
     "failing": Failing,
     "dying": Dying,
     "slow": Slow,
+    "undrawn": Undrawn,
     "filmed": Filmed,
     "circumstance": Circumstance,
 }
