@@ -91,7 +91,7 @@ class PartsSettings(Section):
     """The methods, one a stage; `airside parts` lists them with their settings."""
 
     detect: PartSettings = PartSettings(name="adaptive")
-    extract: PartSettings = PartSettings(name="manhattan")
+    extract: PartSettings = PartSettings(name="hysteresis")
     bearing: PartSettings = PartSettings(name="moments")
     associate: PartSettings = PartSettings(name="gnn")
     filter: PartSettings = PartSettings(name="kalman")

@@ -37,7 +37,7 @@ def put(client: httpx.Client, order: Any, status: int = 200, **how: Any) -> Any:
 def test_what_runs_and_what_there_is(client: httpx.Client) -> None:
     body = client.get(PATH).json()
     assert set(body["running"]) == set(body["available"]) >= set(FRONT_END)
-    assert body["running"]["extract"]["name"] == "manhattan"
+    assert body["running"]["extract"]["name"] == "hysteresis"
     assert body["next"] is None
     assert body["plots_a_scan"] == 214
     assert body["ms_a_turn"]["detect"] == 18.4
