@@ -93,6 +93,13 @@ class _Vectors:
             total = self.builder.add(low, self.builder.lshr(total, self.all(half, kind)))
         return total
 
+    def mean_of_tiles(self, cells: Any) -> Any:
+        """The mean of the eight signed bytes of each tile, rounded, over the cells of the tile."""
+        total = self.sum_of_tiles(self.signed(cells))
+        rounded = self.builder.sub(total, self.all(8 * 128 - 4, _LANES[64]))
+        mean = self.builder.ashr(rounded, self.all(3, _LANES[64]))
+        return self.of_tile(self.builder.bitcast(mean, _CELLS), 0)
+
     def count_of_tiles(self, chosen: Any) -> Any:
         """(8) uint64: how many of the eight cells of each tile are chosen."""
         bits = self.builder.bitcast(self.builder.bitcast(chosen, _WORD), ir.VectorType(_BYTE, 8))
@@ -159,7 +166,8 @@ def learn_tiles(
 
     An offset is the signed byte at `offsets` and 1/256 steps at `fine`. sums: address of 8 uint64: cells that count,
     16 bits; the sum of their residuals above `least` of the rule, 24 bits; of their magnitudes, 24 bits. gains: four
-    bytes, in 1/256, of the classes; most: four bytes, their greatest offsets. strict: 64 bits, the cells that are
+    bytes, in 1/256, of the classes, and a fifth, with which the cells of class 0 follow the mean of their eight as
+    well; most: four bytes, their greatest offsets. strict: 64 bits, the cells that are
     not FREE, and of class 1 where their tile is of a greater one.
     """
 
@@ -198,6 +206,10 @@ def learn_tiles(
         error = builder.select(follows, error, nothing)
         gain = builder.zext(vectors.of_class(flags, words[6]), _WIDE)
         change = builder.mul(builder.sext(error, _WIDE), gain)
+        alike = builder.icmp_unsigned("==", builder.and_(flags, vectors.all(3)), nothing)
+        common = builder.select(builder.and_(alike, follows), vectors.mean_of_tiles(error), nothing)
+        gain = vectors.everywhere(builder.trunc(builder.lshr(words[6], ir.Constant(_WORD, 32)), _BYTE))
+        change = vectors.saturated("sadd", change, builder.mul(builder.sext(common, _WIDE), builder.zext(gain, _WIDE)))
         eight = vectors.all(8, _WIDE)
         whole = builder.or_(builder.shl(builder.sext(offset, _WIDE), eight), builder.zext(fine, _WIDE))
         moved = vectors.saturated("sadd", whole, change)

@@ -25,6 +25,7 @@ def learn(
 ) -> tuple[Whole, Whole, Whole]:
     """The offsets and fines that follow, and (8, 3) what each tile's sums gain: count, residuals, magnitudes."""
     new_offset, new_fine, sums = offset.copy(), fine.copy(), np.zeros((8, 3), np.int64)
+    errors, numbers, following = np.zeros(64, np.int64), np.zeros(64, np.int64), np.zeros(64, bool)
     for j in range(64):
         r = rules[j // 8].tolist()
         residual = _fits(int(cells[j]) - 128 - max(_fits(int(offset[j]) + r[MEAN]), r[WET]))
@@ -35,8 +36,14 @@ def learn(
         number, free, still = r[CLASS] & 3, bool(r[CLASS] & FREE), bool(r[CLASS] & STILL)
         if strict[j]:
             number, free = min(number, 1), False
-        error = _fits(bounded - r[CENTRE]) if (kept or free) and not still else 0
-        moved = min(max(256 * int(offset[j]) + int(fine[j]) + error * gains[number], -32768), 32767)
-        moved = min(moved, 256 * most[number])
+        following[j], numbers[j] = (kept or free) and not still, number
+        errors[j] = _fits(bounded - r[CENTRE]) if following[j] else 0
+    for j in range(64):
+        change = int(errors[j]) * gains[numbers[j]]
+        if numbers[j] == 0 and following[j]:
+            together = (int(errors[j // 8 * 8 : j // 8 * 8 + 8].sum()) + 4) >> 3
+            change = min(max(change + together * gains[4], -32768), 32767)
+        moved = min(max(256 * int(offset[j]) + int(fine[j]) + change, -32768), 32767)
+        moved = min(moved, 256 * most[numbers[j]])
         new_offset[j], new_fine[j] = moved >> 8, moved & 255
     return new_offset, new_fine, sums

@@ -179,8 +179,11 @@ def test_eight_tiles_at_a_time_are_what_one_cell_at_a_time_is(seed: int, extreme
     rules[:, 7] = chance.integers(0, 16, 8)
     drops = np.repeat(chance.integers(0, 128, 8, dtype=np.uint8), 8)
     bits = chance.integers(0, 2, 64)
-    gains, most = chance.integers(0, 256, 4, dtype=np.uint8), chance.integers(0, 128, 4, dtype=np.int8)
-    words = [np.concatenate([one.view(np.uint8), np.zeros(4, np.uint8)]).view(np.uint64)[0] for one in (gains, most)]
+    gains, most = chance.integers(0, 256, 5, dtype=np.uint8), chance.integers(0, 128, 4, dtype=np.int8)
+    words = [
+        np.concatenate([one.view(np.uint8), np.zeros(8 - len(one), np.uint8)]).view(np.uint64)[0]
+        for one in (gains, most)
+    ]
     strict = np.packbits(bits.astype(bool), bitorder="little").view(np.uint64)[0]
     sums = np.full(8, 5 + (7 << 16) + (9 << 40), np.uint64)
     args = [one.astype(np.int64) for one in (cells, offset, fine, rules, bits)]
