@@ -91,9 +91,9 @@ class FrontEndSwitch:
             if not self._changing.acquire(timeout=BUSY_S):
                 raise Refused("another change of the parts is under way")
             try:
+                coming = self._next  # before what runs: what takes over in between is then in either
                 running = parts_of(self._worker.chain)
-                made = {**(self._next or running), **new}
-                self._change(running, made)
+                self._change(running, {**(coming or running), **new})
             finally:
                 self._changing.release()
         finally:
@@ -109,7 +109,7 @@ class FrontEndSwitch:
             worker.succeed(None, lambda _: None)
         elif made != self._next:
             chain = self._compiled(made)
-            self._next = made
+            self._next, running = made, parts_of(worker.chain)
             worker.succeed(chain, lambda well: self._ended(well, running, made))
         try:
             worker.ask(lambda _: None).result(ANSWER_S)

@@ -57,7 +57,7 @@ class StateKeeper:
     def take_up(self, chain: RadarChain) -> bool:
         """Let a chain that has not begun resume what its radar's file holds; the log says why when it does not."""
         radar = chain.site.id
-        counts = self._counts.setdefault(radar, {"states_saved": 0, "state_saves_failed": 0, "states_resumed": 0})
+        counts = self._counting(radar)
         path = self.path(radar)
         most = ROOM * sum(one.nbytes for one in chain.save().values()) + 2**20
         try:
@@ -75,6 +75,8 @@ class StateKeeper:
     def start(self, workers: list[RadarWorker]) -> None:
         """Begin to save."""
         self._workers = workers
+        for worker in workers:
+            self._counting(worker.site.id)
         self._thread.start()
 
     def stop(self) -> None:
@@ -87,6 +89,9 @@ class StateKeeper:
     def counters(self, radar: str) -> dict[str, int]:
         """How often a radar's state was saved, could not be saved, and was taken up."""
         return self._counts.get(radar, {}).copy()
+
+    def _counting(self, radar: str) -> dict[str, int]:
+        return self._counts.setdefault(radar, {"states_saved": 0, "state_saves_failed": 0, "states_resumed": 0})
 
     def save(self) -> None:
         """Save every chain that was swept since the last time. Never raises."""

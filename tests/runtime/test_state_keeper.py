@@ -44,6 +44,13 @@ def test_a_detector_that_learns_for_long_detects_at_once_after_a_restart(tmp_pat
     assert plots_of_first_turn(small_chain(Adaptive())) == 0
 
 
+def test_what_did_not_resume_is_saved_all_the_same(tmp_path: Path) -> None:
+    made = keeper(tmp_path)
+    made.start([turned(small_chain(), 1)])
+    made.stop()
+    assert made.counters("smr-1") == {"states_saved": 1, "state_saves_failed": 0, "states_resumed": 0}
+
+
 def test_what_was_not_swept_is_not_saved_over_what_is_there(tmp_path: Path) -> None:
     first = keeper(tmp_path)
     chain = small_chain()
