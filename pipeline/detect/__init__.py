@@ -57,7 +57,8 @@ class Detector(Protocol):
         """The state of one radar before its first sweep. Raises ValueError for a surface of the wrong shape."""
 
     def __call__(self, sweeps: Sweeps, state: Any) -> Detections:
-        """The detections of the block; `state` is changed in place."""
+        """The detections of the block; `state` is changed in place. Raises TableError, changing nothing, for a block
+        that is not on the grid of the state."""
 
     def thresholds(self, sweeps: Sweeps, state: Any) -> NDArray[np.uint8]:
         """(n, ranges) a cell of the block is detected when its amplitude exceeds this; 255 where nothing is."""

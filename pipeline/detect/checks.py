@@ -7,7 +7,7 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.tables import VideoFormat
+from pipeline.tables import Sweeps, TableError, VideoFormat
 
 LEAST_PFA = 1e-15
 """A year of a radar has fewer cells than false alarms of this probability need."""
@@ -44,3 +44,11 @@ def check_start(video: VideoFormat, surface: NDArray[np.uint8] | None, growth_db
         raise ValueError(f"surface must be ({video.azimuths}, {video.ranges}), not {surface.shape}")
     if growth_db is not None and not (growth_db >= 0 and isfinite(growth_db)):
         raise ValueError("growth_db must be 0 or more")
+
+
+def check_block(sweeps: Sweeps, azimuths: int, ranges: int) -> None:
+    """Raises TableError for a block that is not on the grid: kernels read and write at addresses made of it."""
+    if sweeps.amplitude.shape[1] != ranges:
+        raise TableError(f"{ranges} range cells wanted, not {sweeps.amplitude.shape[1]}")
+    if len(sweeps) and not 0 <= sweeps.row[0] <= sweeps.row[-1] < azimuths:
+        raise TableError(f"rows outside 0 .. {azimuths - 1}")

@@ -21,7 +21,7 @@ from pipeline.detect.calibration import (
     false_alarm_probability,
     recursive_mean_offsets_db,
 )
-from pipeline.detect.checks import check_pfa, check_positive, check_start, check_whole
+from pipeline.detect.checks import check_block, check_pfa, check_positive, check_start, check_whole
 from pipeline.detect.limits import limits_used
 from pipeline.kernels.bits import borrowed
 from pipeline.kernels.run_cap import CapSettings, detect_row
@@ -131,7 +131,8 @@ class ClutterMap:
         )
 
     def __call__(self, sweeps: Sweeps, state: ClutterMapState) -> Detections:
-        """The detections of the block."""
+        """The detections of the block. Raises TableError when it is not on the grid of the state."""
+        check_block(sweeps, state.azimuths, state.level.shape[1])
         mask = np.empty((len(sweeps), state.threshold.size // 64), np.uint64)
         growth = np.empty((len(sweeps), state.growth.size // 64), np.uint64)
         before = int(state.degraded_sweeps[0])

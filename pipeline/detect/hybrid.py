@@ -17,7 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.detect.calibration import estimation_loss_db, threshold_offset_db
-from pipeline.detect.checks import check_pfa, check_start, check_whole
+from pipeline.detect.checks import check_block, check_pfa, check_start, check_whole
 from pipeline.detect.hybrid_map import HybridMapState, detect_in_map_cells, refuse_untrue_levels
 from pipeline.detect.limits import limits_used
 from pipeline.detect.macro_cells import STRIPE_ROWS, MacroCells, MapCells
@@ -44,6 +44,7 @@ class HybridState(ArrayState):
 
     cells: MacroCells
     azimuths: int
+    ranges: int
     offset_steps: float
     loss_steps: float
     growth_steps: float
@@ -112,6 +113,7 @@ class Hybrid:
         independent = min(1.0, video.azimuth_step_rad / video.beamwidth_rad)
         rule: dict[str, Any] = {
             "azimuths": video.azimuths,
+            "ranges": video.ranges,
             "offset_steps": threshold_offset_db(self.pfa, video.db_per_step) / video.db_per_step,
             "loss_steps": estimation_loss_db(self.pfa, video.db_per_step) / video.db_per_step / independent,
             "growth_steps": (growth_db or 0.0) / video.db_per_step,
@@ -139,7 +141,8 @@ class Hybrid:
         )
 
     def __call__(self, sweeps: Sweeps, state: HybridState | HybridMapState) -> Detections:
-        """The detections of the block."""
+        """The detections of the block. Raises TableError when it is not on the grid of the state."""
+        check_block(sweeps, state.azimuths, state.ranges)
         mask = np.empty((len(sweeps), state.threshold.size // 64), np.uint64)
         growth = np.empty(mask.shape if state.grows else (0, 0), np.uint64)
         before = int(state.degraded_sweeps[0])

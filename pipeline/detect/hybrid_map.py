@@ -24,6 +24,7 @@ class HybridMapState(ArrayState):
 
     cells: MapCells
     azimuths: int
+    ranges: int
     offset_steps: float
     loss_steps: float
     growth_steps: float

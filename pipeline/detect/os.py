@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.detect.calibration import false_alarm_probability, order_offset_steps
-from pipeline.detect.checks import check_pfa, check_start, check_whole
+from pipeline.detect.checks import check_block, check_pfa, check_start, check_whole
 from pipeline.detect.limits import limits_used
 from pipeline.detect.window import BEYOND, Window, WindowState, window_fields
 from pipeline.kernels.bits import borrowed
@@ -100,7 +100,8 @@ class OrderedStatistic:
         )
 
     def __call__(self, sweeps: Sweeps, state: OrderedStatisticState) -> Detections:
-        """The detections of the block."""
+        """The detections of the block. Raises TableError when it is not on the grid of the state."""
+        check_block(sweeps, state.azimuths, state.stack.shape[1])
         mask = np.empty((len(sweeps), state.threshold.size // 64), np.uint64)
         growth = np.empty((len(sweeps), state.growth.size // 64), np.uint64)
         before = int(state.degraded_sweeps[0])
