@@ -21,8 +21,15 @@ from pipeline.detect.checks import check_block, check_pfa, check_start, check_wh
 from pipeline.detect.hybrid_map import HybridMapState, detect_in_map_cells, refuse_untrue_levels
 from pipeline.detect.limits import limits_used
 from pipeline.detect.macro_cells import STRIPE_ROWS, MacroCells, MapCells
-from pipeline.kernels.bits import add_pairs, bits_above, borrowed, compare_and_add_four, count_runs
-from pipeline.kernels.run_cap import CapSettings, fit_row, grow_row
+from pipeline.kernels.bits import (
+    add_pairs,
+    bits_above,
+    borrowed,
+    compare_and_add_four,
+    compare_twice_and_add_four,
+    count_runs,
+)
+from pipeline.kernels.run_cap import CapSettings, fit_row
 from pipeline.state import ArrayState, StateError, read_only, remembered
 from pipeline.tables import Detections, Sweeps, VideoFormat
 
@@ -222,7 +229,8 @@ def _detect(
         pair_sums.ctypes.data,
         tail.ctypes.data,
     )
-    mask_at, words = mask.ctypes.data, mask.shape[1]
+    mask_at, grown_at, lower_at = mask.ctypes.data, grown.ctypes.data, growth.ctypes.data
+    step = np.uintp(8 * mask.shape[1])
     left = budget[0]
     i = 0
     while i < n:
@@ -235,17 +243,25 @@ def _detect(
         cursor[SWEPT] += end - i
         k = i
         while k + 4 <= end:
-            row_at, bits_at = cells_at + np.uintp(k) * np.uintp(ranges), mask_at + np.uintp(k) * np.uintp(8 * words)
+            row_at, first_word = cells_at + np.uintp(k) * np.uintp(ranges), np.uintp(k) * step
             for w in range(whole):
                 at = np.uintp(64 * w)
-                compare_and_add_four(
-                    row_at + at,
-                    np.uintp(ranges),
-                    limits_at + at,
-                    sums_at + at,
-                    bits_at + np.uintp(8 * w),
-                    np.uintp(8 * words),
-                )
+                to = first_word + np.uintp(8 * w)
+                if grows:
+                    compare_twice_and_add_four(
+                        row_at + at,
+                        np.uintp(ranges),
+                        sums_at + at,
+                        step,
+                        limits_at + at,
+                        mask_at + to,
+                        lower_at + at,
+                        grown_at + to,
+                    )
+                else:
+                    compare_and_add_four(
+                        row_at + at, np.uintp(ranges), sums_at + at, step, limits_at + at, mask_at + to
+                    )
             k += 4
         while k < end:
             row_at, bits = cells_at + np.uintp(k) * np.uintp(ranges), mask[k]
@@ -253,6 +269,8 @@ def _detect(
                 at = np.uintp(64 * w)
                 bits[w] = bits_above(row_at + at, limits_at + at)
                 add_pairs(row_at + at, sums_at + at)
+                if grows:
+                    grown[k, w] = bits_above(row_at + at, lower_at + at)
             k += 1
         for k in range(i, end):
             cells, bits = amplitude[k], mask[k]
@@ -262,6 +280,8 @@ def _detect(
                 at = np.uintp(64 * whole)
                 bits[whole] = bits_above(tail_at, limits_at + at)
                 add_pairs(tail_at, sums_at + at)
+                if grows:
+                    grown[k, whole] = bits_above(tail_at, lower_at + at)
             left = min(left + refill, depth)
             runs = count_runs(bits)
             raised = runs > left
@@ -274,8 +294,6 @@ def _detect(
                 left -= runs
             if grows and raised:
                 grown[k, :] = bits
-            elif grows:
-                grow_row(cells, growth.ctypes.data, bits, grown[k], tail)
         i = end
     budget[0] = left
 

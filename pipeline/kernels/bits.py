@@ -84,9 +84,31 @@ def add_pairs(typing: Any, cells: Any, sums: Any) -> Any:
     return types.void(types.uintp, types.uintp), build
 
 
+def _four_rows(builder: Any, words: Any) -> None:
+    cells, cells_step, sums, bits_step, *masks = words
+    limits = [(_load(builder, limit, _BYTES), bits) for limit, bits in zip(masks[::2], masks[1::2], strict=True)]
+    rows, at = [], cells
+    for _ in range(4):
+        rows.append(_load(builder, at, _PAIRS))
+        at = builder.add(at, cells_step)
+    # low + high of every pair is pair - 255 * high, in 16 bits whatever the sum of the pairs runs over to
+    eight = ir.Constant(_PAIRS, [8] * 32)
+    highs = [builder.lshr(one, eight) for one in rows]
+    pairs, high = (builder.add(builder.add(four[0], four[1]), builder.add(four[2], four[3])) for four in (rows, highs))
+    total = builder.sub(builder.add(pairs, high), builder.shl(high, eight))
+    total = builder.add(_load(builder, sums, _PAIRS), total)
+    builder.store(total, builder.inttoptr(sums, _PAIRS.as_pointer()), align=2)
+    word = ir.IntType(64)
+    for limit, bits in limits:
+        for one in rows:
+            above = builder.icmp_unsigned(">", builder.bitcast(one, _BYTES), limit)
+            builder.store(builder.bitcast(above, word), builder.inttoptr(bits, word.as_pointer()), align=8)
+            bits = builder.add(bits, bits_step)
+
+
 @intrinsic
 def compare_and_add_four(
-    typing: Any, cells: Any, cells_step: Any, limits: Any, sums: Any, bits: Any, bits_step: Any
+    typing: Any, cells: Any, cells_step: Any, sums: Any, bits_step: Any, limits: Any, bits: Any
 ) -> Any:
     """`bits_above` and `add_pairs` for the same 64 cells of four rows: the limits and sums are taken up once.
 
@@ -95,29 +117,31 @@ def compare_and_add_four(
     """
 
     def build(context: Any, builder: Any, signature: Any, words: Any) -> Any:
-        cells, cells_step, limits, sums, bits, bits_step = words
-        limit = _load(builder, limits, _BYTES)
-        rows, at = [], cells
-        for _ in range(4):
-            rows.append(_load(builder, at, _PAIRS))
-            at = builder.add(at, cells_step)
-        # low + high of every pair is pair - 255 * high, in 16 bits whatever the sum of the pairs runs over to
-        eight = ir.Constant(_PAIRS, [8] * 32)
-        highs = [builder.lshr(one, eight) for one in rows]
-        pairs, high = (
-            builder.add(builder.add(four[0], four[1]), builder.add(four[2], four[3])) for four in (rows, highs)
-        )
-        total = builder.sub(builder.add(pairs, high), builder.shl(high, eight))
-        total = builder.add(_load(builder, sums, _PAIRS), total)
-        builder.store(total, builder.inttoptr(sums, _PAIRS.as_pointer()), align=2)
-        word = ir.IntType(64)
-        for one in rows:
-            above = builder.icmp_unsigned(">", builder.bitcast(one, _BYTES), limit)
-            builder.store(builder.bitcast(above, word), builder.inttoptr(bits, word.as_pointer()), align=8)
-            bits = builder.add(bits, bits_step)
+        _four_rows(builder, words)
         return context.get_dummy_value()
 
     return types.void(*[types.uintp] * 6), build
+
+
+@intrinsic
+def compare_twice_and_add_four(
+    typing: Any,
+    cells: Any,
+    cells_step: Any,
+    sums: Any,
+    bits_step: Any,
+    limits: Any,
+    bits: Any,
+    lower: Any,
+    grown: Any,
+) -> Any:
+    """As compare_and_add_four, and at address `grown` the bits above the limits at address `lower`."""
+
+    def build(context: Any, builder: Any, signature: Any, words: Any) -> Any:
+        _four_rows(builder, words)
+        return context.get_dummy_value()
+
+    return types.void(*[types.uintp] * 8), build
 
 
 @intrinsic

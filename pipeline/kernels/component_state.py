@@ -22,6 +22,9 @@ place and oldest open run of the pool, and counts; TAKEN: steps of the present b
 MOST_OPEN_RUNS = 1 << 20
 """More would be a gigabyte where a part is changed and its state saved."""
 
+NEVER = -(2**60)
+"""A row long before the first."""
+
 MOVE = 512
 """Delivered runs at the beginning of the pool that are worth moving the others down for."""
 
@@ -30,7 +33,8 @@ MOVE = 512
 class ComponentState(ArrayState):
     """The open components. closed_row: see `pipeline.extract`.
 
-    limits: fewest cells of a plot, most rows of a plot, most runs in the rows of open plots.
+    limits: fewest cells of a plot, most rows of a plot, most runs in the rows of open plots. latest: (ranges, 2)
+    absolute row and run of the newest cell at each range.
     """
 
     azimuths: int
@@ -41,7 +45,7 @@ class ComponentState(ArrayState):
     radar: NDArray[np.int64] = remembered()
     runs: NDArray[Any] = remembered()
     window: NDArray[np.int64] = remembered()
-    window_bits: NDArray[np.uint64] = remembered()
+    latest: NDArray[np.int64] = remembered()
     numbers: NDArray[np.int64] = remembered()
     turn: NDArray[np.float64] = remembered()
 
@@ -73,7 +77,7 @@ class ComponentState(ArrayState):
             radar=np.zeros(1, np.int64),
             runs=np.zeros(2 * max_open_runs + MOVE, RUN),
             window=window,
-            window_bits=np.zeros((slots, video.words), np.uint64),
+            latest=np.full((video.ranges, 2), NEVER, np.int64),
             numbers=numbers,
             turn=turn,
             **more,
@@ -119,13 +123,22 @@ class ComponentState(ArrayState):
             at, runs = at[still], runs[still]
             true = true and bool(((tail <= runs["parent"]) & (runs["parent"] <= at)).all())
             true = true and np.array_equal(np.sort(runs["next"]), at)
+        if true:
+            row, run = saved["latest"].T
+            near = np.flatnonzero(row > retired)
+            run = run[near]
+            true = bool(((row <= latest) & ((row <= retired) | (saved["latest"][:, 1] >= tail))).all())
+            true = true and bool((run < head).all())
+            if true:
+                runs = saved["runs"][run]
+                true = bool(((runs["start"] <= near) & (near < runs["end"])).all())
         if not true:
             raise StateError("the saved runs cannot be true")
 
     @property
     def pool(self) -> tuple[NDArray[Any], ...]:
         """What the kernels change."""
-        return self.runs, self.window, self.window_bits, self.numbers, self.turn
+        return self.runs, self.window, self.latest, self.numbers, self.turn
 
     @property
     def scale(self) -> tuple[Any, ...]:

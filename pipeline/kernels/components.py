@@ -26,6 +26,7 @@ from pipeline.kernels.component_state import (
     HEAD,
     LATEST,
     MOVE,
+    NEVER,
     NEWEST,
     RETIRED,
     SEEDLESS,
@@ -46,7 +47,7 @@ from pipeline.kernels.plot_shape import (
     measure_plot,
     measure_run,
 )
-from pipeline.kernels.runs import FREE, any_bit, find, find_runs, unite
+from pipeline.kernels.runs import FREE, find, find_runs, unite
 from pipeline.state import read_only
 from pipeline.tables import Detections, Plots, Sweeps
 
@@ -82,6 +83,7 @@ def take_block(sweeps: Sweeps, detections: Detections, state: ComponentState) ->
 def flush(state: ComponentState) -> Plots:
     """Complete all open components."""
     columns = state.columns()
+    state.latest[:, 0] = NEVER
     after = int(state.numbers[NEWEST]) + len(state.window) + 1
     geometry = state.scale[:3]
     count = retire(after, state.azimuths, state.rule.rows, state.limits, state.pool, geometry, columns.arrays, 0)
@@ -172,9 +174,9 @@ def take_row(
     scale: Any,
 ) -> None:
     """Add the runs of a row to the pool and link them to those of the rows before; retire() comes first."""
-    runs, window, window_bits, numbers, _ = pool
+    runs, window, latest, numbers, _ = pool
     if numbers[TAIL] >= MOVE and 2 * numbers[TAIL] >= numbers[HEAD]:
-        _move_down(runs, window, numbers)
+        _move_down(runs, window, latest, numbers)
     first = numbers[HEAD]
     room = limits[2] - (first - numbers[TAIL])
     head, dropped = find_runs(bits, seeds, grown, cells, grid_row, rule, scale, runs, first, room)
@@ -185,50 +187,42 @@ def take_row(
     numbers[LATEST] = row
     slot = row & (window.shape[0] - 1)
     window[slot, 0], window[slot, 1], window[slot, 2] = row, first, head
-    kept = window_bits[slot]
-    for w in range(kept.size):
-        kept[w] = bits[w]
-    _link_rows(row, grid_row, azimuths, first, head, limits[1], rule[2], pool)
+    _link_runs(row, grid_row, azimuths, first, head, limits[1], rule, runs, latest)
+    for run in range(first, head):
+        for cell in range(runs[run].start, runs[run].end):
+            latest[cell, 0], latest[cell, 1] = row, run
 
 
 @inlined()
-def _link_rows(
-    row: int, grid_row: int, azimuths: int, first: int, head: int, most_rows: int, reach: Any, pool: Any
+def _link_runs(
+    row: int, grid_row: int, azimuths: int, first: int, head: int, most_rows: int, rule: Any, runs: Any, latest: Any
 ) -> None:
-    runs, window, window_bits, _, _ = pool
-    last_bit = 64 * window_bits.shape[1] - 1
-    for back in range(1, reach.shape[1]):
-        if reach[runs[first].ring, back] < 0:
-            break
-        slot = (row - back) & (window.shape[0] - 1)
-        if window[slot, 0] != row - back:
-            continue
-        before = window_bits[slot]
-        p, stop = window[slot, 1], window[slot, 2]
-        for run in range(first, head):
-            away = reach[runs[run].ring, back]
-            if away < 0:
-                break
-            low, high = np.int64(runs[run].start) - away, np.int64(runs[run].end) - 1
-            if not any_bit(before, max(low, 0), min(high + away, last_bit)):
+    # The newest cell at each range is enough: an older one at that range that links to a run links to the newest, too
+    # (or was refused, as its plot is too long already).
+    ring_of_cell, _, reach, _ = rule
+    far = reach.shape[1] - 1
+    for run in range(first, head):
+        start, end, ring = np.int64(runs[run].start), np.int64(runs[run].end), np.int64(runs[run].ring)
+        most = reach[ring, 1]
+        linked = np.int64(-1)
+        for cell in range(max(start - most, 0), min(end + most, latest.shape[0])):
+            back = row - latest[cell, 0]
+            if back > far or latest[cell, 1] == linked:
                 continue
-            while p < stop and runs[p].end <= low:
-                p += 1
-            mine = find(runs, np.int64(run))
-            for q in range(p, stop):
-                gap = np.int64(runs[q].start) - high
-                if gap > 0 and gap > reach[runs[q].ring, back]:
-                    break
-                other = find(runs, np.int64(q))
-                if other != mine:
-                    rows = grid_row - np.int64(runs[other].row)
-                    rows += 0 if rows >= 0 else azimuths
-                    if rows < most_rows:
-                        mine = unite(runs, mine, other, grid_row)
+            gap = start - cell if cell < start else max(cell - end + 1, 0)
+            if gap > reach[ring if cell < end else ring_of_cell[cell], back]:
+                continue
+            linked = latest[cell, 1]
+            mine, other = find(runs, np.int64(run)), find(runs, linked)
+            if other != mine:
+                rows = grid_row - np.int64(runs[other].row)
+                rows += 0 if rows >= 0 else azimuths
+                if rows < most_rows:
+                    unite(runs, mine, other, grid_row)
 
 
 @kernel()
-def _move_down(runs: Any, window: Any, numbers: Any) -> None:
+def _move_down(runs: Any, window: Any, latest: Any, numbers: Any) -> None:
     by, head = numbers[TAIL], numbers[HEAD]
     for k in range(by, head):
         runs[k - by] = runs[k]
@@ -238,6 +232,8 @@ def _move_down(runs: Any, window: Any, numbers: Any) -> None:
     for slot in range(window.shape[0]):
         window[slot, 1] -= by
         window[slot, 2] -= by
+    for cell in range(latest.shape[0]):
+        latest[cell, 1] -= by
     numbers[TAIL] = 0
     numbers[HEAD] = head - by
 

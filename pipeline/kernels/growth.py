@@ -14,53 +14,51 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.kernels.bits import count_runs
+from pipeline.kernels.bits import count_runs, trailing_zeros
 from pipeline.kernels.compiled import inlined, kernel
 from pipeline.kernels.component_state import NEWEST, TAKEN, ComponentState
 from pipeline.kernels.components import fetch_row, flush, note_row, open_runs, retire, take_row
 from pipeline.kernels.links import LinkRule
 from pipeline.kernels.run_cap import CapSettings
+from pipeline.kernels.runs import filled_from
 from pipeline.sites import RadarSite
 from pipeline.state import read_only, remembered
 from pipeline.tables import Detections, Plots, Sweeps, VideoFormat
 
-ARRIVED, PENDING, FILLED, REACHED, SKIPPED = range(5)
+ARRIVED, PENDING, FILLED, SKIPPED = range(4)
 """Places in `GrowthState.marks`: newest row that came in, first row not yet looked at, row up to which the bucket of
-runs was filled, newest row that is near a detected cell so far, and a count."""
-
-
-ROW, REACH, ACTIVE = range(3)
-"""Places in `GrowthState.held_rows`: absolute row, rows about it that are near a detected cell of its own (-1 without),
-and whether anything is near in it (`held_near` is only then up to date)."""
+runs was filled, and a count."""
 
 
 @dataclass(frozen=True, eq=False)
 class GrowthWindow:
-    """masks: (rows + 1, words) the range cells at which a cell that many rows away is near. words: (rows + 1) words
-    with such cells. rows: (words) how far off rows are near at the first cell of each word. max_runs: cap on the runs
-    that grow in a turn; a row that does not fit keeps its detected cells only, counted.
+    """masks: (rows + 1, words + 1) the range cells at which a cell that many rows away is near; the last word is empty.
+    rows: (words) how far off rows are near at the first cell of each word. max_runs: cap on the runs that grow in a
+    turn; a row that does not fit keeps its detected cells only, counted.
     """
 
     masks: NDArray[np.uint64]
-    words: NDArray[np.int64]
     rows: NDArray[np.int64]
     max_runs: int
 
     @classmethod
     def of(cls, video: VideoFormat, rule: LinkRule, max_runs: int) -> GrowthWindow:
         """The window that links the cells of plots: for a rule over no more than the next range cell."""
-        near = np.zeros((rule.rows + 1, 64 * video.words), np.bool_)
+        near = np.zeros((rule.rows + 1, 64 * (video.words + 1)), np.bool_)
         near[:, : video.ranges] = (rule.reach[rule.ring_of_cell] >= 0).T
         masks = np.packbits(near, axis=1, bitorder="little").view(np.uint64)
-        words = np.array([np.flatnonzero(one)[-1] + 1 if one.any() else 0 for one in masks], np.int64)
-        rows = (words > np.arange(video.words)[:, None]).sum(axis=1) - 1
-        return cls(masks, words, rows.astype(np.int64), max_runs)
+        rows = near[:, : 64 * video.words : 64].sum(axis=0) - 1
+        return cls(masks, rows.astype(np.int64), max_runs)
 
 
 @dataclass(eq=False, kw_only=True)
 class GrowthState(ComponentState):
     """The open components, and the rows that wait for what comes after them: those of the present block stay in it,
-    and are held here only from one block to the next."""
+    and are held here only from one block to the next.
+
+    held_near: the cells near detected ones of the row that stands at the same place in near_rows, also of rows that
+    are still to come.
+    """
 
     near: GrowthWindow
     scratch: NDArray[np.uint64]
@@ -69,6 +67,7 @@ class GrowthState(ComponentState):
     held_growth: NDArray[np.uint64] = remembered()
     held_seeds: NDArray[np.uint64] = remembered()
     held_near: NDArray[np.uint64] = remembered()
+    near_rows: NDArray[np.int64] = remembered()
     held_sweep: NDArray[np.float64] = remembered()
     held_rows: NDArray[np.int64] = remembered()
     marks: NDArray[np.int64] = remembered()
@@ -78,7 +77,7 @@ class GrowthState(ComponentState):
     def growing(cls, site: RadarSite, rule: LinkRule, near: GrowthWindow, **limits: Any) -> GrowthState:
         """A state in which nothing is open. limits: as in ComponentState.of."""
         video = site.video
-        slots = 1 << len(near.words).bit_length()
+        slots, places = 1 << len(near.masks).bit_length(), 1 << (2 * len(near.masks)).bit_length()
         made = cls.of(
             site,
             rule,
@@ -88,10 +87,11 @@ class GrowthState(ComponentState):
             held_cells=np.zeros((slots, video.ranges), np.uint8),
             held_growth=np.zeros((slots, video.words), np.uint64),
             held_seeds=np.zeros((slots, video.words), np.uint64),
-            held_near=np.zeros((slots, video.words), np.uint64),
+            held_near=np.zeros((places, video.words), np.uint64),
+            near_rows=np.full(places, -1, np.int64),
             held_sweep=np.zeros((slots, 2)),
-            held_rows=np.full((slots, 3), -1, np.int64),
-            marks=np.array([-1, 0, 0, -1, 0], np.int64),
+            held_rows=np.full(slots, -1, np.int64),
+            marks=np.array([-1, 0, 0, 0], np.int64),
             budget=np.array([CapSettings.of(near.max_runs, video.azimuths).depth]),
             **limits,
         )
@@ -108,14 +108,14 @@ class GrowthState(ComponentState):
         """What the kernels change."""
         return (
             self.held_rows, self.held_sweep, self.held_near, self.marks, self.budget, self.scratch, self.waiting,
-            self.held_seeds, self.held_growth, self.held_cells,
+            self.held_seeds, self.held_growth, self.held_cells, self.near_rows,
         )  # fmt: skip
 
     @property
     def box(self) -> tuple[Any, ...]:
         """The window, and the bucket."""
         cap = CapSettings.of(self.near.max_runs, self.azimuths)
-        return self.near.masks, self.near.words, self.near.rows, cap.refill, cap.depth
+        return self.near.masks, self.near.rows, cap.refill, cap.depth
 
 
 def take_grown_block(sweeps: Sweeps, detections: Detections, state: GrowthState) -> Plots:
@@ -190,7 +190,7 @@ def _take_rows(
     held_rows, marks, waiting = held[0], held[3], held[6]
     numbers = pool[3]
     video = (mask, growth, amplitude)
-    delay = box[1].size - 1
+    delay = box[0].shape[0] - 1
     count = 0
     done = numbers[TAKEN]
     while done < rows.size:
@@ -201,7 +201,7 @@ def _take_rows(
             if not whole:
                 break
             fetch_row(mask[done], amplitude, done)
-            _arrive(row, done, mask, azimuth[done], times[done], box, held, kept)
+            _arrive(row, done, mask, azimuth[done], times[done], box, held)
         done += 1
     if done == rows.size:
         last = marks[ARRIVED] - (delay if rows.size else 0)
@@ -212,7 +212,7 @@ def _take_rows(
             count = retire(numbers[NEWEST], azimuths, rule[2].shape[1] - 1, limits, pool, geometry, out, count)
             for slot in range(waiting.size):
                 at = waiting[slot]
-                if at >= 0 and held_rows[slot, ROW] >= marks[PENDING]:
+                if at >= 0 and held_rows[slot] >= marks[PENDING]:
                     _keep(mask[at], held[7][slot])
                     _keep(growth[at], held[8][slot])
                     _keep(amplitude[at], held[9][slot])
@@ -229,57 +229,49 @@ def _keep(source: Any, into: Any) -> None:
 
 
 @inlined()
-def _arrive(row: int, at: int, mask: Any, azimuth: float, time: float, box: Any, held: Any, kept: Any) -> None:
-    """Note a row, and mark what is near between it and the rows that came before."""
-    held_rows, held_sweep, held_near, marks, _, _, waiting, _, _, _ = held
-    masks, words, rows_of = box[0], box[1], box[2]
-    places = waiting.size - 1
-    slot = row & places
-    seeds = mask[at]
-    anything = np.uint64(0)
-    for w in range(seeds.size):
-        anything |= seeds[w]
-    reach = np.int64(-1)
-    if anything:
-        first = np.int64(0)
-        while not seeds[first]:
-            first += 1
-        reach = rows_of[first]
-    mine = held_rows[slot]
-    mine[ROW], mine[REACH], mine[ACTIVE] = row, reach, 0
+def _arrive(row: int, at: int, mask: Any, azimuth: float, time: float, box: Any, held: Any) -> None:
+    """Note a row, and mark what is near its detected cells in the rows about it."""
+    held_rows, held_sweep, marks, waiting = held[0], held[1], held[3], held[6]
+    slot = row & (waiting.size - 1)
+    held_rows[slot] = row
     held_sweep[slot, 0], held_sweep[slot, 1] = azimuth, time
     waiting[slot] = at
     marks[ARRIVED] = row
-    if reach >= 0:
-        _spread(seeds, masks[0], words[0], held_near[slot], mine)
-    # the rows before this one that are near its detected cells, or have such that are near this one
-    farthest = words.size - 1 if marks[REACHED] >= row else reach
-    for back in range(1, min(farthest, row) + 1):
-        other = (row - back) & places
-        theirs = held_rows[other]
-        if theirs[ROW] != row - back:
-            continue
-        if theirs[REACH] >= back:
-            before = mask[waiting[other]] if waiting[other] >= 0 else kept[0][other]
-            _spread(before, masks[back], words[back], held_near[slot], mine)
-        if reach >= back:
-            _spread(seeds, masks[back], words[back], held_near[other], theirs)
-    marks[REACHED] = max(marks[REACHED], row + reach)
+    seeds = mask[at]
+    for block in range(0, seeds.size, 8):
+        filled = np.uint64(filled_from(seeds, block))
+        while filled:
+            w = block + np.int64(trailing_zeros(filled))
+            filled &= filled - np.uint64(1)
+            _spread(row, w, seeds[w], box, held[2], held[10])
 
 
 @inlined()
-def _spread(seeds: Any, mask: Any, words: int, near: Any, row: Any) -> None:
-    """Mark the detected cells of a row, and the cells next to them, within the mask."""
+def _spread(row: int, w: int, seeds: Any, box: Any, near: Any, near_rows: Any) -> None:
+    """Mark the detected cells of a word, and the cells next to them, in all rows that they are near."""
     one, top = np.uint64(1), np.uint64(63)
-    if not row[ACTIVE]:
-        row[ACTIVE] = 1
-        for w in range(near.size):
-            near[w] = np.uint64(0)
-    before, here = np.uint64(0), seeds[0] & mask[0]
-    for w in range(words):
-        after = seeds[w + 1] & mask[w + 1] if w + 1 < words else np.uint64(0)
-        near[w] |= (here | here << one | here >> one | before >> top | after << top) & mask[w]
-        before, here = here, after
+    masks, rows = box[0], box[1]
+    for back in range(rows[w] + 1):
+        mask = masks[back, w]
+        here = seeds & mask
+        if not here:
+            break
+        wide = (here | here << one | here >> one) & mask
+        # the cell before is near wherever this one is, the cell after need not be
+        below, above = (here & one) << top, (here >> top) & masks[back, w + 1]
+        for other in (row - back, row + back):
+            if other < 0:
+                continue
+            place = other & (near_rows.size - 1)
+            if near_rows[place] != other:
+                near_rows[place] = other
+                for k in range(near.shape[1]):
+                    near[place, k] = np.uint64(0)
+            near[place, w] |= wide
+            if below and w:
+                near[place, w - 1] |= below
+            if above:
+                near[place, w + 1] |= above
 
 
 @inlined()
@@ -298,10 +290,10 @@ def _look_to(
     count: int,
 ) -> tuple[int, bool]:
     """Look at the waiting rows up to `last`. Gives the count of plots, and False where there was no room for more."""
-    held_rows, marks, waiting = held[0], held[3], held[6]
+    held_rows, marks, waiting, near_rows = held[0], held[3], held[6], held[10]
     for row in range(marks[PENDING], min(last, marks[ARRIVED]) + 1):
         slot = row & (waiting.size - 1)
-        if held_rows[slot, ROW] != row or not held_rows[slot, ACTIVE]:
+        if held_rows[slot] != row or near_rows[row & (near_rows.size - 1)] != row:
             continue
         if count + open_runs(pool[3]) > out[0].shape[1]:
             marks[PENDING] = row
@@ -328,12 +320,12 @@ def _look_at(
     count: int,
 ) -> Any:
     """Take a row of which all that is near is known. Gives the new count of plots."""
-    _, held_sweep, held_near, marks, budget, bits, waiting, _, _, _ = held
+    _, held_sweep, held_near, marks, budget, bits, waiting, _, _, _, near_rows = held
     at = waiting[slot]
     seeds = video[0][at] if at >= 0 else kept[0][slot]
     growth = video[1][at] if at >= 0 else kept[1][slot]
     cells = video[2][at] if at >= 0 else kept[2][slot]
-    if _choose(row, seeds, growth, held_near[slot], bits, box, marks, budget):
+    if _choose(row, seeds, growth, held_near[row & (near_rows.size - 1)], bits, box, marks, budget):
         grid_row = row % azimuths
         geometry = (scale[0], scale[1], scale[2])
         count = retire(row, azimuths, rule[2].shape[1] - 1, limits, pool, geometry, out, count)
@@ -352,7 +344,7 @@ def _choose(row: int, seeds: Any, growth: Any, near: Any, bits: Any, box: Any, m
         anything |= word
     if not anything:
         return False
-    budget[0] = min(budget[0] + box[3] * (row - marks[FILLED]), box[4])
+    budget[0] = min(budget[0] + box[2] * (row - marks[FILLED]), box[3])
     marks[FILLED] = row
     runs = count_runs(bits)
     if runs > budget[0]:

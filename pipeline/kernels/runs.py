@@ -71,37 +71,28 @@ def unite(runs: Any, a: Any, b: Any, row: Any) -> Any:
 
 
 @inlined()
-def any_bit(bits: Any, first: Any, last: Any) -> bool:
-    """Whether any of the bits first .. last (both included) of a row of words is set."""
-    w, stop = first >> 6, last >> 6
-    everything = np.uint64(0xFFFFFFFFFFFFFFFF)
-    low = everything << np.uint64(first & 63)
-    high = everything >> np.uint64(63 - (last & 63))
-    if w == stop:
-        return bool(bits[w] & low & high)
-    if bits[w] & low:
-        return True
-    w += 1
-    while w < stop:
-        if bits[w]:
-            return True
-        w += 1
-    return bool(bits[stop] & high)
-
-
-@kernel()
 def count_set(bits: Any, start: int, end: int) -> Any:
     """How many of the bits start .. end - 1 of a row of words are set."""
-    found = np.int64(0)
     everything = np.uint64(0xFFFFFFFFFFFFFFFF)
-    for w in range(start >> 6, ((end - 1) >> 6) + 1):
-        word = bits[w]
-        if w == start >> 6:
-            word &= everything << np.uint64(start & 63)
-        if w == (end - 1) >> 6:
-            word &= everything >> np.uint64(63 - ((end - 1) & 63))
-        found += np.int64(set_bits(word))
+    w, stop = start >> 6, (end - 1) >> 6
+    low, high = everything << np.uint64(start & 63), everything >> np.uint64(63 - ((end - 1) & 63))
+    if w == stop:
+        return np.int64(set_bits(bits[w] & low & high))
+    found = np.int64(set_bits(bits[w] & low)) + np.int64(set_bits(bits[stop] & high))
+    for between in range(w + 1, stop):
+        found += np.int64(set_bits(bits[between]))
     return found
+
+
+@inlined()
+def filled_from(bits: Any, block: int) -> Any:
+    """Bit w is set when word block + w of a row of words is not empty, for the next eight or what is left."""
+    if block + 8 <= bits.size:
+        return filled_words(bits.ctypes.data + np.uintp(8 * block))
+    filled = np.uint64(0)
+    for rest in range(bits.size - block):
+        filled |= np.uint64(bits[block + rest] != 0) << np.uint64(rest)
+    return filled
 
 
 @inlined()
@@ -112,12 +103,7 @@ def edges_of(bits: Any, edges: Any) -> Any:
     many, after = np.int64(0), np.int64(0)
     carry = np.uint64(0)
     for block in range(0, bits.size, 8):
-        filled = np.uint64(0)
-        if block + 8 <= bits.size:
-            filled = filled_words(bits.ctypes.data + np.uintp(8 * block))
-        else:
-            for rest in range(bits.size - block):
-                filled |= np.uint64(bits[block + rest] != 0) << np.uint64(rest)
+        filled = np.uint64(filled_from(bits, block))
         while filled:
             w: Any = block + np.int64(trailing_zeros(filled))
             filled &= filled - one

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numba import njit
 from numpy.typing import NDArray
 
-from pipeline.kernels.bits import bits_of_row, compare_and_add_four, count_runs
+from pipeline.kernels.bits import bits_of_row, compare_and_add_four, compare_twice_and_add_four, count_runs
 from pipeline.kernels.run_cap import detect_row, fit_row
 
 
@@ -56,6 +56,11 @@ def test_four_rows_at_a_time() -> None:
     _four(cells, limits, total, bits)
     np.testing.assert_array_equal(np.stack([unpacked(one) for one in bits]), cells > limits)
     np.testing.assert_array_equal(total, sums + cells.reshape(4, 32, 2).astype(int).sum(axis=(0, 2)))
+    lower, twice, grown, again = limits // 2, np.zeros_like(bits), np.zeros_like(bits), sums.copy()
+    _four_twice(cells, limits, again, twice, lower, grown)
+    np.testing.assert_array_equal(twice, bits)
+    np.testing.assert_array_equal(again, total)
+    np.testing.assert_array_equal(np.stack([unpacked(one) for one in grown]), cells > lower)
 
 
 @settings(max_examples=60, deadline=None)
@@ -108,6 +113,14 @@ def _fit(cells: Any, limits: Any, bits: Any, budget: Any, tail: Any) -> None:
 
 @njit
 def _four(cells: Any, limits: Any, sums: Any, bits: Any) -> None:
-    compare_and_add_four(
-        cells.ctypes.data, np.uintp(64), limits.ctypes.data, sums.ctypes.data, bits.ctypes.data, np.uintp(8)
+    step, words = np.uintp(64), np.uintp(8)
+    compare_and_add_four(cells.ctypes.data, step, sums.ctypes.data, words, limits.ctypes.data, bits.ctypes.data)
+
+
+@njit
+def _four_twice(cells: Any, limits: Any, sums: Any, bits: Any, lower: Any, grown: Any) -> None:
+    step, words = np.uintp(64), np.uintp(8)
+    cells_at, sums_at, limits_at, lower_at = cells.ctypes.data, sums.ctypes.data, limits.ctypes.data, lower.ctypes.data
+    compare_twice_and_add_four(
+        cells_at, step, sums_at, words, limits_at, bits.ctypes.data, lower_at, grown.ctypes.data
     )
