@@ -99,11 +99,12 @@ def _four_rows(builder: Any, words: Any) -> None:
     total = builder.add(_load(builder, sums, _PAIRS), total)
     builder.store(total, builder.inttoptr(sums, _PAIRS.as_pointer()), align=2)
     word = ir.IntType(64)
-    for limit, bits in limits:
+    for limit, first in limits:
+        at = first
         for one in rows:
             above = builder.icmp_unsigned(">", builder.bitcast(one, _BYTES), limit)
-            builder.store(builder.bitcast(above, word), builder.inttoptr(bits, word.as_pointer()), align=8)
-            bits = builder.add(bits, bits_step)
+            builder.store(builder.bitcast(above, word), builder.inttoptr(at, word.as_pointer()), align=8)
+            at = builder.add(at, bits_step)
 
 
 @intrinsic

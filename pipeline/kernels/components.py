@@ -204,7 +204,7 @@ def _link_runs(
     for run in range(first, head):
         start, end, ring = np.int64(runs[run].start), np.int64(runs[run].end), np.int64(runs[run].ring)
         most = reach[ring, 1]
-        linked = np.int64(-1)
+        linked, mine = np.int64(-1), np.int64(run)
         for cell in range(max(start - most, 0), min(end + most, latest.shape[0])):
             back = row - latest[cell, 0]
             if back > far or latest[cell, 1] == linked:
@@ -213,12 +213,13 @@ def _link_runs(
             if gap > reach[ring if cell < end else ring_of_cell[cell], back]:
                 continue
             linked = latest[cell, 1]
-            mine, other = find(runs, np.int64(run)), find(runs, linked)
+            mine = find(runs, mine)
+            other = find(runs, linked)
             if other != mine:
                 rows = grid_row - np.int64(runs[other].row)
                 rows += 0 if rows >= 0 else azimuths
                 if rows < most_rows:
-                    unite(runs, mine, other, grid_row)
+                    mine = unite(runs, mine, other, grid_row)
 
 
 @kernel()

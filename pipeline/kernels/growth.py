@@ -187,39 +187,45 @@ def _take_rows(
     kept: Any,
 ) -> int:
     mask, growth, amplitude, rows, azimuth, times = block
-    held_rows, marks, waiting = held[0], held[3], held[6]
-    numbers = pool[3]
+    marks, numbers = held[3], pool[3]
     video = (mask, growth, amplitude)
     delay = box[0].shape[0] - 1
     count = 0
     done = numbers[TAKEN]
-    while done < rows.size:
-        row = first_row + rows[done]
-        if marks[ARRIVED] < row:
-            last = row - delay - 1
+    while done <= rows.size:
+        at_end = done == rows.size
+        row = marks[ARRIVED] + 1 if at_end else first_row + rows[done]
+        if row > marks[ARRIVED]:
+            last = row - 1 - (delay if rows.size else 0)
             count, whole = _look_to(last, video, azimuths, rule, limits, pool, scale, out, box, held, kept, count)
             if not whole:
                 break
-            fetch_row(mask[done], amplitude, done)
-            _arrive(row, done, mask, azimuth[done], times[done], box, held)
+            if not at_end:
+                fetch_row(mask[done], amplitude, done)
+                _arrive(row, done, mask, azimuth[done], times[done], box, held)
+            elif count + open_runs(numbers) <= out[0].shape[1]:
+                numbers[NEWEST] = max(last, numbers[NEWEST])
+                geometry = (scale[0], scale[1], scale[2])
+                count = retire(numbers[NEWEST], azimuths, rule[2].shape[1] - 1, limits, pool, geometry, out, count)
+                _keep_waiting(mask, growth, amplitude, held)
+            else:
+                break
         done += 1
-    if done == rows.size:
-        last = marks[ARRIVED] - (delay if rows.size else 0)
-        count, whole = _look_to(last, video, azimuths, rule, limits, pool, scale, out, box, held, kept, count)
-        if whole and count + open_runs(numbers) <= out[0].shape[1]:
-            numbers[NEWEST] = max(last, numbers[NEWEST])
-            geometry = (scale[0], scale[1], scale[2])
-            count = retire(numbers[NEWEST], azimuths, rule[2].shape[1] - 1, limits, pool, geometry, out, count)
-            for slot in range(waiting.size):
-                at = waiting[slot]
-                if at >= 0 and held_rows[slot] >= marks[PENDING]:
-                    _keep(mask[at], held[7][slot])
-                    _keep(growth[at], held[8][slot])
-                    _keep(amplitude[at], held[9][slot])
-                waiting[slot] = -1
-            done += 1
     numbers[TAKEN] = done
     return count
+
+
+@inlined()
+def _keep_waiting(mask: Any, growth: Any, amplitude: Any, held: Any) -> None:
+    """Copy the rows that are still to be looked at out of the block."""
+    held_rows, marks, waiting = held[0], held[3], held[6]
+    for slot in range(waiting.size):
+        at = waiting[slot]
+        if at >= 0 and held_rows[slot] >= marks[PENDING]:
+            _keep(mask[at], held[7][slot])
+            _keep(growth[at], held[8][slot])
+            _keep(amplitude[at], held[9][slot])
+        waiting[slot] = -1
 
 
 @inlined()
@@ -303,7 +309,7 @@ def _look_to(
     return count, True
 
 
-@kernel()
+@inlined()
 def _look_at(
     row: int,
     slot: int,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.kernels.bits import filled_words, set_bits, trailing_zeros
-from pipeline.kernels.compiled import inlined, kernel
+from pipeline.kernels.compiled import inlined
 
 RUN = np.dtype(
     [

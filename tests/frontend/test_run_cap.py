@@ -121,6 +121,4 @@ def _four(cells: Any, limits: Any, sums: Any, bits: Any) -> None:
 def _four_twice(cells: Any, limits: Any, sums: Any, bits: Any, lower: Any, grown: Any) -> None:
     step, words = np.uintp(64), np.uintp(8)
     cells_at, sums_at, limits_at, lower_at = cells.ctypes.data, sums.ctypes.data, limits.ctypes.data, lower.ctypes.data
-    compare_twice_and_add_four(
-        cells_at, step, sums_at, words, limits_at, bits.ctypes.data, lower_at, grown.ctypes.data
-    )
+    compare_twice_and_add_four(cells_at, step, sums_at, words, limits_at, bits.ctypes.data, lower_at, grown.ctypes.data)
