@@ -259,7 +259,8 @@ def update_patches(rule: Any, layout: Any, cells: Any, patches: Any, cursor: Any
         level[p] += move if told or few else np.float32(0.0)
         wider = second / (n * rule.magnitude) - s
         faster = max(rule.spread * n / (n + np.float32(100.0)), one / (scans + np.float32(3.0)))
-        s = s if young or few or not told else s + faster * wider
+        drowned = kind_class[p] == 3 and rain[macro[p]] > np.float32(DRY)
+        s = s if young or few or drowned or not told else s + faster * wider
         spread[p] = min(max(s, np.float32(SPREADS[0])), np.float32(SPREADS[1]))
         risen = level[p] - dry[p]
         slower = rule.dry if risen < rule.dead else rule.dry * np.float32(0.125)
@@ -269,7 +270,7 @@ def update_patches(rule: Any, layout: Any, cells: Any, patches: Any, cursor: Any
         fresh |= told and (young or heard[p] == AGAIN - 1)
         heard[p] += np.int32(told or few)
     if fresh or cursor[3] % 16 == 0:
-        _find_sources(layout, heard, dry, patches[7], patches[13])
+        _find_sources(layout, heard, dry, patches[7], patches[13], rain)
     _fall_of_rain(rule, layout, patches)
     if fresh:
         _begin(rule, layout, cells, patches)
@@ -336,17 +337,23 @@ def _fall_of_rain(rule: Any, layout: Any, patches: Any) -> None:
 
 
 @njit(nogil=True, cache=True)
-def _find_sources(layout: Any, heard: Any, dry: Any, lowest: Any, source: Any) -> None:
+def _find_sources(layout: Any, heard: Any, dry: Any, lowest: Any, source: Any, rain: Any) -> None:
     """The darkest telling patch of each macro-cell, and the macro-cell near it whose darkest patch tells most of its
-    rain: dark and near."""
+    rain: dark and near. Where it rains they stay: another would tell of other rain, and the levels would jump."""
     macro, telling, near, apart = layout[1], layout[4], layout[5], layout[6]
-    lowest[:] = -1
+    wet = np.zeros(lowest.size, np.bool_)
+    for m in range(lowest.size):
+        wet[source[m]] |= rain[m] > np.float32(DRY)
+    for m in range(lowest.size):
+        lowest[m] = lowest[m] if wet[m] else -1
     for p in range(heard.size):
-        if heard[p] > 0 and telling[p]:
+        if heard[p] > 0 and telling[p] and not wet[macro[p]]:
             known = lowest[macro[p]]
             if known < 0 or dry[p] < dry[known]:
                 lowest[macro[p]] = p
     for m in range(lowest.size):
+        if rain[m] > np.float32(DRY):
+            continue
         best = np.float32(1e9)
         for k in range(near.shape[1]):
             p = lowest[near[m, k]]

@@ -17,7 +17,8 @@ BASE, FLOOR, MEAN, WET, KEEP, CENTRE, LEAST, CLASS = range(8)
 """base: limit of a cell of offset 0. floor: least limit of any cell; 127 shows nothing. mean: clutter mean of a cell of
 offset 0. wet: least clutter mean of any cell. Of the residual, amplitude less offset and mean: keep: up to it a cell
 counts for the means, and its offset follows; least: it is raised to this; centre: what it is in the mean. class: 0 to
-3, which gain and bound the tile's offsets have, and FREE or STILL."""
+3, which gain and bound the tile's offsets have, and FREE or STILL. In class 3 a cell whose own mean is below the wet
+one counts as if it were at the centre: it tells of the rain alone, nothing of the walls beside it."""
 
 FREE, STILL = 4, 8
 """Added to the class of a tile whose offsets follow whatever comes, or nothing."""
@@ -175,12 +176,15 @@ def learn_tiles(
         vectors = _Vectors(builder)
         cells, offset, fine, rules = (vectors.load(one) for one in words[:4])
         place = [vectors.of_tile(rules, number) for number in range(8)]
-        mean = vectors.greater(vectors.saturated("sadd", offset, place[MEAN]), place[WET])
-        residual = vectors.saturated("ssub", vectors.signed(cells), mean)
+        nothing = vectors.all(0)
+        own = vectors.saturated("sadd", offset, place[MEAN])
+        residual = vectors.saturated("ssub", vectors.signed(cells), vectors.greater(own, place[WET]))
+        kept = builder.icmp_signed("<=", residual, place[KEEP])
+        last = builder.icmp_unsigned("==", builder.and_(place[CLASS], vectors.all(3)), vectors.all(3))
+        drowned = builder.and_(last, builder.icmp_signed("<", own, place[WET]))
+        residual = builder.select(drowned, place[CENTRE], residual)
         bounded = vectors.greater(residual, place[LEAST])
 
-        kept = builder.icmp_signed("<=", residual, place[KEEP])
-        nothing = vectors.all(0)
         magnitude = builder.select(
             builder.icmp_signed("<", residual, nothing), builder.sub(nothing, residual), residual
         )

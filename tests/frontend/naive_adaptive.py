@@ -28,9 +28,12 @@ def learn(
     errors, numbers, following = np.zeros(64, np.int64), np.zeros(64, np.int64), np.zeros(64, bool)
     for j in range(64):
         r = rules[j // 8].tolist()
-        residual = _fits(int(cells[j]) - 128 - max(_fits(int(offset[j]) + r[MEAN]), r[WET]))
-        bounded = max(residual, r[LEAST])
+        own = _fits(int(offset[j]) + r[MEAN])
+        residual = _fits(int(cells[j]) - 128 - max(own, r[WET]))
         kept = residual <= r[KEEP]
+        if r[CLASS] & 3 == 3 and own < r[WET]:
+            residual = r[CENTRE]
+        bounded = max(residual, r[LEAST])
         if kept:
             sums[j // 8] += (1, (bounded - r[LEAST]) % 256, abs(residual))
         number, free, still = r[CLASS] & 3, bool(r[CLASS] & FREE), bool(r[CLASS] & STILL)
