@@ -35,7 +35,8 @@ from numpy.typing import NDArray
 from pipeline.detect.calibration import estimation_loss_db, residual_moments_db, threshold_offset_db
 from pipeline.detect.checks import check_pfa, check_positive, check_start, check_whole
 from pipeline.detect.patches import BUILDING, GRASS, MIXED, Patches
-from pipeline.kernels.adaptive import DRY, Rule, detect
+from pipeline.kernels.adaptive import Rule, detect
+from pipeline.kernels.rainfall import DRY
 from pipeline.kernels.run_cap import CapSettings
 from pipeline.kernels.tiles import STILL
 from pipeline.state import ArrayState, StateError, read_only, remembered
@@ -82,6 +83,7 @@ class AdaptiveState(ArrayState):
     like: NDArray[np.int32]
     gain: NDArray[np.float32]
     own_rain: NDArray[np.float32]
+    ahead: NDArray[np.float32]
     strict: NDArray[np.uint64]
     tail: NDArray[np.uint8]
     limits: NDArray[np.uint8]
@@ -179,6 +181,7 @@ class Adaptive:
             source=np.arange(macros, dtype=np.int32),
             gain=np.zeros(many, np.float32),
             own_rain=np.zeros(macros, np.float32),
+            ahead=np.zeros(many, np.float32),
             strict=patches.paved,
             tail=np.zeros(64, np.uint8),
             limits=np.zeros(64 * video.words, np.uint8),
@@ -242,6 +245,7 @@ class Adaptive:
                 state.gain,
                 state.own_rain,
                 state.source,
+                state.ahead,
             ),
             (state.rules, state.drops, state.pending, state.cursor),
             (cap.refill, cap.depth, state.budget, state.degraded_sweeps, state.limits),

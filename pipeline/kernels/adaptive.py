@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from pipeline.kernels.bits import borrowed, count_runs
+from pipeline.kernels.rainfall import ALARM, DRY, fall_of_rain, find_sources, rise_together
 from pipeline.kernels.run_cap import fit_row
 from pipeline.kernels.tiles import (
     BASE,
@@ -32,18 +33,14 @@ TILE_ROWS = 16
 LEARN_EVERY = 8
 """Once the start is over, a row learns in every eighth scan: its offsets then remember for minutes."""
 
-DRY = -1000.0
-"""Rain of no power, in steps."""
+SMALL = 500
+"""A pavement patch of fewer cells may be filled by an aircraft: it is never far above its like."""
 
 FEW = 0.45
 """Where less than this part of a patch is ordinary, it is the patch that has changed, not what stands on it."""
 
 SPREADS = (0.93, 1.8)
 """Least and greatest spread to follow, relative to Rayleigh clutter."""
-
-ALARM = 8.0
-"""A level that rises by a standard deviation more than its sample would is followed faster, and by three as fast as
-allowed."""
 
 ENOUGH = 250
 """Cells that tell a level well."""
@@ -232,11 +229,13 @@ def update_patches(rule: Any, layout: Any, cells: Any, patches: Any, cursor: Any
     level, dry, spread, heard = borrowed(patches[0]), borrowed(patches[1]), borrowed(patches[2]), borrowed(patches[3])
     sums, rule_of, drop_of = borrowed(patches[4]), borrowed(patches[5]), borrowed(patches[6])
     rain, mean_at, least_at, gain_of = borrowed(patches[8]), borrowed(patches[9]), borrowed(patches[10]), patches[11]
+    ahead, like = patches[14], layout[7]
     one = np.float32(1.0)
     fresh: Any = False
     full = cursor[2] == rule.azimuths
     share = np.float32(FEW * cursor[4] / rule.azimuths)
     cursor[3] += 1
+    rise_together(rule, layout, patches)
     for p in range(level.size):
         packed = sums[p]
         sums[p] = 0
@@ -267,11 +266,12 @@ def update_patches(rule: Any, layout: Any, cells: Any, patches: Any, cursor: Any
         slower = max(np.float32(0.25) if risen < 0 else slower, one / (scans + one))
         dry[p] = level[p] if young else dry[p] + slower * risen
         gain_of[p] = gain
+        ahead[p] = 0
         fresh |= told and (young or heard[p] == AGAIN - 1)
         heard[p] += np.int32(told or few)
     if fresh or cursor[3] % 16 == 0:
-        _find_sources(layout, heard, dry, patches[7], patches[13], rain)
-    _fall_of_rain(rule, layout, patches)
+        find_sources(layout, heard, dry, patches[7], patches[13], rain)
+    fall_of_rain(rule, layout, patches)
     if fresh:
         _begin(rule, layout, cells, patches)
     turn = np.float32(cursor[3] * 0.6180339887)
@@ -279,7 +279,9 @@ def update_patches(rule: Any, layout: Any, cells: Any, patches: Any, cursor: Any
     for p in range(level.size):
         young = heard[p] == 0
         s = spread[p]
-        above = rule.threshold * s
+        if kind_class[p] == 0 and expected[p] < SMALL and like[p, 0] >= 0:
+            level[p] = min(level[p], _greatest(like[p], heard, level, level[p]) + rule.wet)
+        above = rule.threshold * s + ahead[p]
         base = np.floor(level[p] + above + np.float32(0.5))
         wet = min(rain[macro[p]] + rule.wet, level[p] - rule.below)
         mean = np.float32(0.0) if young else np.floor(level[p] + np.float32(0.5))
@@ -301,65 +303,6 @@ def update_patches(rule: Any, layout: Any, cells: Any, patches: Any, cursor: Any
         )
         lower = base - np.floor(level[p] + rule.growth * s + np.float32(0.5))
         drop_of[p] = np.uint8(0 if deaf else min(max(lower, np.float32(0.0)), np.float32(127.0)))
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def _fall_of_rain(rule: Any, layout: Any, patches: Any) -> None:
-    """How hard it rains on each macro-cell, by the rise of its darkest patch, and the other patches raised by that: the
-    power of rain adds to that of the ground."""
-    macro, source = layout[1], patches[13]
-    level, dry, heard = borrowed(patches[0]), borrowed(patches[1]), borrowed(patches[3])
-    lowest, rain, gain_of, own = patches[7], patches[8], patches[11], patches[12]
-    to_power = np.float32(np.log(10.0) / 10.0) * rule.step_db
-    nothing = np.float32(DRY)
-    for m in range(own.size):
-        dark = np.uintp(max(lowest[m], 0))
-        rise = level[dark] - dry[dark]
-        own[m] = nothing
-        if lowest[m] >= 0 and rise > rule.dead:
-            own[m] = dry[dark] + np.log(np.exp(rise * to_power) - np.exp(rule.dead * to_power)) / to_power
-    changed = False
-    for m in range(own.size):
-        changed |= own[source[m]] != rain[m]
-    if not changed:
-        return
-    for p in range(level.size):
-        here = macro[p]
-        before, after = rain[here], own[source[here]]
-        if before == after or lowest[here] == p or heard[p] == 0:
-            continue
-        over = max(before, after) - dry[p]
-        if over > np.float32(-20.0) / rule.step_db:
-            was, now = np.exp((before - dry[p]) * to_power), np.exp((after - dry[p]) * to_power)
-            level[p] += (np.float32(1.0) - gain_of[p]) * np.log((1 + now) / (1 + was)) / to_power
-    for m in range(own.size):
-        rain[m] = own[source[m]]
-
-
-@njit(nogil=True, cache=True)
-def _find_sources(layout: Any, heard: Any, dry: Any, lowest: Any, source: Any, rain: Any) -> None:
-    """The darkest telling patch of each macro-cell, and the macro-cell near it whose darkest patch tells most of its
-    rain: dark and near. Where it rains they stay: another would tell of other rain, and the levels would jump."""
-    macro, telling, near, apart = layout[1], layout[4], layout[5], layout[6]
-    wet = np.zeros(lowest.size, np.bool_)
-    for m in range(lowest.size):
-        wet[source[m]] |= rain[m] > np.float32(DRY)
-    for m in range(lowest.size):
-        lowest[m] = lowest[m] if wet[m] else -1
-    for p in range(heard.size):
-        if heard[p] > 0 and telling[p] and not wet[macro[p]]:
-            known = lowest[macro[p]]
-            if known < 0 or dry[p] < dry[known]:
-                lowest[macro[p]] = p
-    for m in range(lowest.size):
-        if rain[m] > np.float32(DRY):
-            continue
-        best = np.float32(1e9)
-        for k in range(near.shape[1]):
-            p = lowest[near[m, k]]
-            if p >= 0 and dry[p] + apart[m, k] < best:
-                best = dry[p] + apart[m, k]
-                source[m] = near[m, k]
 
 
 @njit(nogil=True, cache=True)
