@@ -60,13 +60,13 @@ def estimation_loss_db(pfa: float, db_per_step: float) -> float:
 
 @lru_cache(maxsize=16)
 def residual_moments_db(most_db: float, least_db: float) -> tuple[float, float, float]:
-    """Of log Rayleigh clutter about its mean, as far as it is no more than most_db: the mean when what lies below
-    least_db is raised to it, the mean magnitude as it is, and the standard deviation when raised."""
+    """Of log Rayleigh clutter about its mean, as far as it is no more than most_db: the mean, the mean
+    magnitude and the standard deviation when what lies below least_db is raised to it."""
     power = -np.log1p(-(np.arange(200_000) + 0.5) / 200_000)
     decibels = 10 * np.log10(power) - LOG_MEAN_DB
     left = decibels[decibels <= most_db]
     raised = np.maximum(left, least_db)
-    return float(raised.mean()), float(np.abs(left).mean()), float(raised.std())
+    return float(raised.mean()), float(np.abs(raised).mean()), float(raised.std())
 
 
 def log_mean_offset_db(

@@ -33,6 +33,10 @@ TILE_ROWS = 16
 LEARN_EVERY = 8
 """Once the start is over, a row learns in every eighth scan: its offsets then remember for minutes."""
 
+HURRY = 4.0
+"""At first a spread follows so many times faster than a mean would, which would not forget the first scans: with
+a wrong spread, other cells are kept."""
+
 SMALL = 500
 """A pavement patch of fewer cells may be filled by an aircraft: it is never far above its like."""
 
@@ -257,7 +261,8 @@ def update_patches(rule: Any, layout: Any, cells: Any, patches: Any, cursor: Any
         move = rule.keep * s if few else gain * moved
         level[p] += move if told or few else np.float32(0.0)
         wider = second / (n * rule.magnitude) - s
-        faster = max(rule.spread * n / (n + np.float32(100.0)), one / (scans + np.float32(3.0)))
+        hurry = max(rule.spread, np.float32(HURRY) / (scans + np.float32(HURRY + 3.0)))
+        faster = max(hurry * n / (n + np.float32(100.0)), one / (scans + np.float32(3.0)))
         drowned = kind_class[p] == 3 and rain[macro[p]] > np.float32(DRY)
         s = s if young or few or drowned or not told else s + faster * wider
         spread[p] = min(max(s, np.float32(SPREADS[0])), np.float32(SPREADS[1]))
@@ -285,7 +290,7 @@ def update_patches(rule: Any, layout: Any, cells: Any, patches: Any, cursor: Any
         base = np.floor(level[p] + above + np.float32(0.5))
         wet = min(rain[macro[p]] + rule.wet, level[p] - rule.below)
         mean = np.float32(0.0) if young else np.floor(level[p] + np.float32(0.5))
-        least = np.float32(-128.0) if young else -np.floor(rule.least * s)
+        least = np.float32(-128.0) if young else -np.floor(rule.least * s + np.float32(0.5))
         deaf = np.float32(heard[p]) < rule.learn or base > np.float32(127.0)
         free = kind_class[p] > 0 and np.float32(heard[p]) < rule.soft
         flags = np.uint64(STILL) if young else np.uint64(FREE) if free else np.uint64(0)

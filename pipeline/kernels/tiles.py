@@ -185,9 +185,7 @@ def learn_tiles(
         residual = builder.select(drowned, place[CENTRE], residual)
         bounded = vectors.greater(residual, place[LEAST])
 
-        magnitude = builder.select(
-            builder.icmp_signed("<", residual, nothing), builder.sub(nothing, residual), residual
-        )
+        magnitude = builder.select(builder.icmp_signed("<", bounded, nothing), builder.sub(nothing, bounded), bounded)
         count = vectors.count_of_tiles(kept)
         first = vectors.sum_of_tiles(builder.select(kept, builder.sub(bounded, place[LEAST]), nothing))
         second = vectors.sum_of_tiles(builder.select(kept, magnitude, nothing))

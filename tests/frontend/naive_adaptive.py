@@ -35,7 +35,7 @@ def learn(
             residual = r[CENTRE]
         bounded = max(residual, r[LEAST])
         if kept:
-            sums[j // 8] += (1, (bounded - r[LEAST]) % 256, abs(residual))
+            sums[j // 8] += (1, (bounded - r[LEAST]) % 256, abs(bounded))
         number, free, still = r[CLASS] & 3, bool(r[CLASS] & FREE), bool(r[CLASS] & STILL)
         if strict[j]:
             number, free = min(number, 1), False
