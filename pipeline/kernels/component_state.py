@@ -33,7 +33,7 @@ MOVE = 512
 class ComponentState(ArrayState):
     """The open components. closed_row: see `pipeline.extract`.
 
-    limits: fewest cells of a plot, most rows of a plot, most runs in the rows of open plots. latest: (ranges, 2)
+    limits: fewest cells of a plot, most rows of a plot, most runs in the rows of open plots. latest: (2, ranges)
     absolute row and run of the newest cell at each range.
     """
 
@@ -77,7 +77,7 @@ class ComponentState(ArrayState):
             radar=np.zeros(1, np.int64),
             runs=np.zeros(2 * max_open_runs + MOVE, RUN),
             window=window,
-            latest=np.full((video.ranges, 2), NEVER, np.int64),
+            latest=np.full((2, video.ranges), NEVER, np.int64),
             numbers=numbers,
             turn=turn,
             **more,
@@ -124,10 +124,10 @@ class ComponentState(ArrayState):
             true = true and bool(((tail <= runs["parent"]) & (runs["parent"] <= at)).all())
             true = true and np.array_equal(np.sort(runs["next"]), at)
         if true:
-            row, run = saved["latest"].T
+            row, run = saved["latest"]
             near = np.flatnonzero(row > retired)
             run = run[near]
-            true = bool(((row <= latest) & ((row <= retired) | (saved["latest"][:, 1] >= tail))).all())
+            true = bool(((row <= latest) & ((row <= retired) | (saved["latest"][1] >= tail))).all())
             true = true and bool((run < head).all())
             if true:
                 runs = saved["runs"][run]

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.kernels.bits import fetch_ahead, filled_words, trailing_zeros
+from pipeline.kernels.bits import fetch_ahead, trailing_zeros
 from pipeline.kernels.compiled import inlined, kernel
 from pipeline.kernels.component_state import (
     CELLS,
@@ -47,7 +47,7 @@ from pipeline.kernels.plot_shape import (
     measure_plot,
     measure_run,
 )
-from pipeline.kernels.runs import FREE, find, find_runs, unite
+from pipeline.kernels.runs import FREE, filled_from, find, find_runs, unite
 from pipeline.state import read_only
 from pipeline.tables import Detections, Plots, Sweeps
 
@@ -83,7 +83,7 @@ def take_block(sweeps: Sweeps, detections: Detections, state: ComponentState) ->
 def flush(state: ComponentState) -> Plots:
     """Complete all open components."""
     columns = state.columns()
-    state.latest[:, 0] = NEVER
+    state.latest[0] = NEVER
     after = int(state.numbers[NEWEST]) + len(state.window) + 1
     geometry = state.scale[:3]
     count = retire(after, state.azimuths, state.rule.rows, state.limits, state.pool, geometry, columns.arrays, 0)
@@ -100,18 +100,18 @@ def _take_rows(
     geometry = (scale[0], scale[1], scale[2])
     count = 0
     done = numbers[TAKEN]
+    filled = np.uint64(0)  # bit k: whether the row after the next k has runs
     for soon in range(done, min(done + AHEAD, rows.size)):
-        fetch_row(mask[soon], amplitude, soon)
+        filled |= np.uint64(fetch_row(mask[soon], amplitude, soon)) << np.uint64(soon - done)
     while done <= rows.size:
         at_end = done == rows.size
         bits = mask[done - at_end]
         if not at_end:
             if done + AHEAD < rows.size:
-                fetch_row(mask[done + AHEAD], amplitude, done + AHEAD)
-            anything = np.uint64(0)
-            for w in range(bits.size):
-                anything |= bits[w]
-            if not anything:
+                filled |= np.uint64(fetch_row(mask[done + AHEAD], amplitude, done + AHEAD)) << np.uint64(AHEAD)
+            here = filled & np.uint64(1)
+            filled >>= np.uint64(1)
+            if not here:
                 done += 1
                 continue
         if count + open_runs(numbers) > out[0].shape[1]:
@@ -130,14 +130,18 @@ def _take_rows(
 
 
 @inlined()
-def fetch_row(bits: Any, amplitude: Any, at: int) -> None:
-    """Ask for the cells under a row's bits: waiting for them costs more than all the rest."""
+def fetch_row(bits: Any, amplitude: Any, at: int) -> bool:
+    """Ask for the cells under a row's bits: waiting for them costs more than all the rest. Tells whether there are
+    any."""
     cells = amplitude.ctypes.data + np.uintp(at) * np.uintp(amplitude.shape[1])
-    for block in range(0, bits.size - 7, 8):
-        filled = filled_words(bits.ctypes.data + np.uintp(8 * block))
+    anything = False
+    for block in range(0, bits.size, 8):
+        filled = np.uint64(filled_from(bits, block))
+        anything |= filled != np.uint64(0)
         while filled:
             fetch_ahead(cells + np.uintp(64 * block) + np.uintp(64) * np.uintp(trailing_zeros(filled)))
             filled &= filled - np.uint64(1)
+    return anything
 
 
 @inlined()
@@ -187,32 +191,48 @@ def take_row(
     numbers[LATEST] = row
     slot = row & (window.shape[0] - 1)
     window[slot, 0], window[slot, 1], window[slot, 2] = row, first, head
-    _link_runs(row, grid_row, azimuths, first, head, limits[1], rule, runs, latest)
+    latest_row, latest_run = latest[0], latest[1]
+    _link_runs(row, grid_row, azimuths, first, head, limits[1], rule, runs, latest_row, latest_run)
     for run in range(first, head):
-        for cell in range(runs[run].start, runs[run].end):
-            latest[cell, 0], latest[cell, 1] = row, run
+        for cell in range(np.uintp(runs[run].start), np.uintp(runs[run].end)):
+            latest_row[cell] = row
+            latest_run[cell] = run
 
 
 @inlined()
 def _link_runs(
-    row: int, grid_row: int, azimuths: int, first: int, head: int, most_rows: int, rule: Any, runs: Any, latest: Any
+    row: int,
+    grid_row: int,
+    azimuths: int,
+    first: int,
+    head: int,
+    most_rows: int,
+    rule: Any,
+    runs: Any,
+    latest_row: Any,
+    latest_run: Any,
 ) -> None:
     # The newest cell at each range is enough: an older one at that range that links to a run links to the newest, too
     # (or was refused, as its plot is too long already).
-    ring_of_cell, _, reach, _ = rule
-    far = reach.shape[1] - 1
+    ring_of_cell, _, reach, depth, _ = rule
     for run in range(first, head):
         start, end, ring = np.int64(runs[run].start), np.int64(runs[run].end), np.int64(runs[run].ring)
-        most = reach[ring, 1]
+        most, oldest = reach[ring, 1], row - depth[ring]
         linked, mine = np.int64(-1), np.int64(run)
-        for cell in range(max(start - most, 0), min(end + most, latest.shape[0])):
-            back = row - latest[cell, 0]
-            if back > far or latest[cell, 1] == linked:
+        after, stop = max(start - most, 0), min(end + most, latest_row.size)
+        while after < stop:
+            cell = np.uintp(after)
+            after += 1
+            if latest_row[cell] < oldest or latest_run[cell] == linked:
                 continue
-            gap = start - cell if cell < start else max(cell - end + 1, 0)
-            if gap > reach[ring if cell < end else ring_of_cell[cell], back]:
+            back = row - latest_row[cell]
+            at = np.int64(cell)
+            gap = start - at if at < start else max(at - end + 1, 0)
+            if gap > reach[ring if at < end else ring_of_cell[cell], back]:
                 continue
-            linked = latest[cell, 1]
+            linked = latest_run[cell]
+            if back == 1:  # no newer cell before the end of that run
+                after = np.int64(runs[linked].end)
             mine = find(runs, mine)
             other = find(runs, linked)
             if other != mine:
@@ -233,8 +253,8 @@ def _move_down(runs: Any, window: Any, latest: Any, numbers: Any) -> None:
     for slot in range(window.shape[0]):
         window[slot, 1] -= by
         window[slot, 2] -= by
-    for cell in range(latest.shape[0]):
-        latest[cell, 1] -= by
+    for cell in range(latest.shape[1]):
+        latest[1, cell] -= by
     numbers[TAIL] = 0
     numbers[HEAD] = head - by
 

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 class LinkRule:
     """ring_of_cell: (ranges) ring of each range cell. ring_stop: (rings) cell after each ring's last. reach: (rings,
     rows + 1) greatest range distance, in cells, of two linked cells at each row distance; -1 where none links.
-    edges: room for the ends of a row's runs.
+    depth: (rings) greatest row distance at which cells of the ring link. edges: room for the ends of a row's runs.
     """
 
     ring_of_cell: NDArray[np.int64]
     ring_stop: NDArray[np.int64]
     reach: NDArray[np.int64]
+    depth: NDArray[np.int64]
     edges: NDArray[np.int64]
 
     @classmethod
@@ -39,7 +40,8 @@ class LinkRule:
         table = np.full((len(stop), rows + 1), -1, np.int64)
         kept = reach[stop - 1][:, : rows + 1]
         table[:, : kept.shape[1]] = kept
-        return cls(ring, stop, table, np.zeros(len(reach) + 66, np.int64))
+        depth = (table >= 0).sum(axis=1) - 1
+        return cls(ring, stop, table, depth.astype(np.int64), np.zeros(len(reach) + 66, np.int64))
 
     @property
     def rows(self) -> int:
@@ -49,4 +51,4 @@ class LinkRule:
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
         """What the kernels take; the last is room to write in."""
-        return self.ring_of_cell, self.ring_stop, self.reach, self.edges
+        return self.ring_of_cell, self.ring_stop, self.reach, self.depth, self.edges

@@ -141,10 +141,10 @@ def find_runs(
     there was no room for.
 
     bits, seeds: (words) cells of plots, and those of them that the detector found (the same unless `grown`). row: in
-    the azimuth grid. rule: (ring_of_cell, ring_stop, reach, edges) of a LinkRule. scale: (constants, ground, sums,
+    the azimuth grid. rule: `arrays` of a LinkRule. scale: (constants, ground, sums,
     loudness) of a Geometry.
     """
-    ring_of_cell, ring_stop, reach, edges = rule
+    ring_of_cell, ring_stop, reach, _, edges = rule
     ground, loudness = scale[1], scale[3]
     first, stop = head, head + room
     dropped = 0
