@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from pipeline.detect.calibration import estimation_loss_db, residual_moments_db, threshold_offset_db
 from pipeline.detect.checks import check_pfa, check_positive, check_start, check_whole
 from pipeline.detect.patches import BUILDING, GRASS, MIXED, Patches
-from pipeline.kernels.adaptive import Rule, detect
+from pipeline.kernels.adaptive import LEARN_EVERY, Rule, detect
 from pipeline.kernels.rainfall import DRY
 from pipeline.kernels.run_cap import CapSettings
 from pipeline.kernels.tiles import STILL
@@ -169,7 +169,7 @@ class Adaptive:
         macros = int(patches.macro.max()) + 1
         return AdaptiveState(
             azimuths=video.azimuths,
-            settings=self._rule(video, growth_db or 0.0),
+            settings=self._rule(video, growth_db or 0.0, float(np.square(patches.cells).sum() / patches.cells.sum())),
             tile=patches.tile,
             macro=patches.macro.astype(np.int32),
             kind=_classes(patches.kind),
@@ -254,12 +254,14 @@ class Adaptive:
         degraded = int(state.degraded_sweeps[0]) > before
         return Detections(mask, degraded, growth if state.drops.size else None)
 
-    def _rule(self, video: VideoFormat, growth_db: float) -> Rule:
+    def _rule(self, video: VideoFormat, growth_db: float, patch_cells: float) -> Rule:
         step = video.db_per_step
         offset_db = threshold_offset_db(self.pfa, step)
         gain = 1.0 / (self.offset_scans + FIRST[PAVED])
         keep_db = offset_db - self.margin_db
-        mu = offset_db + estimation_loss_db(self.pfa, step) * gain / (2 - gain)
+        calm = 1.0 / self.calm_scans
+        unsure = gain / (2 - gain) + calm / (2 - calm) * LEARN_EVERY / max(patch_cells, LEARN_EVERY)
+        mu = offset_db + estimation_loss_db(self.pfa, step) * unsure
         missing, magnitude, deviation = residual_moments_db(keep_db, -LEAST_KEPT * keep_db)
         most = [self.most_offset_db, self.grass_offset_db, *WIDE_DB]
         return Rule(
@@ -270,7 +272,7 @@ class Adaptive:
             missing=np.float32(missing / step),
             magnitude=np.float32(magnitude / step),
             deviation=np.float32(deviation / step),
-            calm=np.float32(1 / self.calm_scans),
+            calm=np.float32(calm),
             quick=np.float32(1 / self.level_scans),
             spread=np.float32(1 / self.spread_scans),
             dry=np.float32(1 / self.dry_scans),
