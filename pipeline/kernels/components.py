@@ -194,7 +194,8 @@ def take_row(
     latest_row, latest_run = latest[0], latest[1]
     _link_runs(row, grid_row, azimuths, first, head, limits[1], rule, runs, latest_row, latest_run)
     for run in range(first, head):
-        for cell in range(np.uintp(runs[run].start), np.uintp(runs[run].end)):
+        one = runs[np.uintp(run)]
+        for cell in range(np.uintp(one.start), np.uintp(one.end)):
             latest_row[cell] = row
             latest_run[cell] = run
 
@@ -216,7 +217,8 @@ def _link_runs(
     # (or was refused, as its plot is too long already).
     ring_of_cell, _, reach, depth, _ = rule
     for run in range(first, head):
-        start, end, ring = np.int64(runs[run].start), np.int64(runs[run].end), np.int64(runs[run].ring)
+        one = runs[np.uintp(run)]
+        start, end, ring = np.int64(one.start), np.int64(one.end), np.int64(one.ring)
         most, oldest = reach[ring, 1], row - depth[ring]
         linked, mine = np.int64(-1), np.int64(run)
         after, stop = max(start - most, 0), min(end + most, latest_row.size)
@@ -232,7 +234,7 @@ def _link_runs(
                 continue
             linked = latest_run[cell]
             if back == 1:  # no newer cell before the end of that run
-                after = np.int64(runs[linked].end)
+                after = np.int64(runs[np.uintp(linked)].end)
             mine = find(runs, mine)
             other = find(runs, linked)
             if other != mine:
@@ -279,7 +281,7 @@ def retire(
             continue
         window[slot, 0] = -1
         for run in range(window[slot, 1], window[slot, 2]):
-            one = runs[run]
+            one = runs[np.uintp(run)]
             if one.parent == FREE:
                 continue
             alone = one.next == run

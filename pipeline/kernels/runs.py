@@ -43,13 +43,14 @@ FREE = -1
 @inlined()
 def find(runs: Any, run: Any) -> Any:
     """The root of a run's component: its oldest run."""
+    at = np.uintp(run)  # unsigned, here and below: numba would ask of a signed index whether it counts from the end
     while True:
-        parent = np.int64(runs[run].parent)
-        if parent == run:
-            return run
-        above = np.int64(runs[parent].parent)
-        runs[run].parent = above
-        run = above
+        parent = np.uintp(runs[at].parent)
+        if parent == at:
+            return np.int64(at)
+        above = runs[parent].parent
+        runs[at].parent = above
+        at = np.uintp(above)
 
 
 @inlined()
@@ -60,13 +61,14 @@ def unite(runs: Any, a: Any, b: Any, row: Any) -> Any:
     """
     if b < a:
         a, b = b, a
-    runs[b].parent = a
-    after = runs[a].next
-    runs[a].next = runs[b].next
-    runs[b].next = after
-    runs[a].last = row
-    runs[a].seeds += runs[b].seeds
-    runs[a].cells += runs[b].cells
+    root, other = runs[np.uintp(a)], runs[np.uintp(b)]
+    other.parent = a
+    after = root.next
+    root.next = other.next
+    other.next = after
+    root.last = row
+    root.seeds += other.seeds
+    root.cells += other.cells
     return a
 
 
@@ -151,24 +153,25 @@ def find_runs(
     for k in range(0, edges_of(bits, edges), 2):
         begin, until = edges[k], min(edges[k + 1], cells.size)
         while begin < until:
-            ring = ring_of_cell[begin]
+            at = np.uintp(begin)
+            ring = ring_of_cell[at]
             end = min(until, ring_stop[ring])
             if head == stop:
                 dropped += 1
                 begin = end
                 continue
-            total = peak = low = np.int64(cells[begin])
-            weight = loudness[total]
-            moment = weight * ground[begin]
-            for j in range(begin + 1, end):
+            total = peak = low = np.int64(cells[at])
+            weight = loudness[np.uintp(cells[at])]
+            moment = weight * ground[at]
+            for j in range(at + np.uintp(1), np.uintp(end)):
                 value = np.int64(cells[j])
                 total += value
                 peak = max(peak, value)
                 low = min(low, value)
-                loud = loudness[value]
+                loud = loudness[np.uintp(cells[j])]
                 weight += loud
                 moment += loud * ground[j]
-            run = runs[head]
+            run = runs[np.uintp(head)]
             run.weight, run.moment = weight, moment
             run.start, run.end, run.ring, run.row = begin, end, ring, row
             run.parent, run.next, run.last = head, head, row
