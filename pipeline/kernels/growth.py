@@ -247,7 +247,7 @@ def _arrive(row: int, at: int, mask: Any, azimuth: float, time: float, box: Any,
     for block in range(0, seeds.size, 8):
         filled = np.uint64(filled_from(seeds, block))
         while filled:
-            w = block + np.int64(trailing_zeros(filled))
+            w = np.uintp(block) + np.uintp(trailing_zeros(filled))
             filled &= filled - np.uint64(1)
             _spread(row, w, seeds[w], box, held[2], held[10])
 
@@ -258,26 +258,26 @@ def _spread(row: int, w: int, seeds: Any, box: Any, near: Any, near_rows: Any) -
     one, top = np.uint64(1), np.uint64(63)
     masks, rows = box[0], box[1]
     for back in range(rows[w] + 1):
-        mask = masks[back, w]
+        mask = masks[np.uintp(back), w]
         here = seeds & mask
         if not here:
             break
         wide = (here | here << one | here >> one) & mask
         # the cell before is near wherever this one is, the cell after need not be
-        below, above = (here & one) << top, (here >> top) & masks[back, w + 1]
+        below, above = (here & one) << top, (here >> top) & masks[np.uintp(back), w + one]
         for other in (row - back, row + back):
             if other < 0:
                 continue
-            place = other & (near_rows.size - 1)
+            place = np.uintp(other & (near_rows.size - 1))
             if near_rows[place] != other:
                 near_rows[place] = other
                 for k in range(near.shape[1]):
                     near[place, k] = np.uint64(0)
             near[place, w] |= wide
             if below and w:
-                near[place, w - 1] |= below
+                near[place, w - one] |= below
             if above:
-                near[place, w + 1] |= above
+                near[place, w + one] |= above
 
 
 @inlined()
