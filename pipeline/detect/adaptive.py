@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.detect.calibration import estimation_loss_db, residual_moments_db, threshold_offset_db
-from pipeline.detect.checks import check_pfa, check_positive, check_start, check_whole
+from pipeline.detect.checks import check_block, check_pfa, check_positive, check_start, check_whole
 from pipeline.detect.patches import BUILDING, GRASS, MIXED, Patches
 from pipeline.kernels.adaptive import LEARN_EVERY, Rule, detect
 from pipeline.kernels.rainfall import DRY
@@ -72,6 +72,7 @@ class AdaptiveState(ArrayState):
     is the stripe of tiles being swept, and the run cap."""
 
     azimuths: int
+    ranges: int
     settings: Rule
     tile: NDArray[np.int32]
     macro: NDArray[np.int32]
@@ -156,6 +157,10 @@ class Adaptive:
         check_whole(12, offset_scans=self.offset_scans)
         if min(self.level_scans, self.calm_scans, self.spread_scans, self.dry_scans) < 1:
             raise ValueError("level_scans, calm_scans, spread_scans and dry_scans must be 1 or more")
+        if self.learn_scans > 3600:
+            raise ValueError("learn_scans must be 3600 or less: for so long nothing is shown")
+        if threshold_offset_db(self.pfa, 1e-3) - self.margin_db < 1.0:
+            raise ValueError("margin_db must be at least 1 dB less than the threshold's offset, which pfa sets")
 
     def start(
         self, video: VideoFormat, surface: NDArray[np.uint8] | None = None, growth_db: float | None = None
@@ -169,6 +174,7 @@ class Adaptive:
         macros = int(patches.macro.max()) + 1
         return AdaptiveState(
             azimuths=video.azimuths,
+            ranges=video.ranges,
             settings=self._rule(video, growth_db or 0.0, float(np.square(patches.cells).sum() / patches.cells.sum())),
             tile=patches.tile,
             macro=patches.macro.astype(np.int32),
@@ -218,6 +224,7 @@ class Adaptive:
         return used
 
     def _run(self, sweeps: Sweeps, state: AdaptiveState, used: NDArray[np.uint8]) -> Detections:
+        check_block(sweeps, state.azimuths, state.ranges)
         mask = np.empty((len(sweeps), state.limits.size // 64), np.uint64)
         growth = np.empty((len(sweeps), state.drops.size // 64), np.uint64)
         before = int(state.degraded_sweeps[0])

@@ -19,7 +19,14 @@ def block(first: int, ranges: int) -> Sweeps:
 
 @pytest.mark.parametrize(
     ("name", "setting"),
-    [("ca", {}), ("os", {"sweeps": 2}), ("clutter_map", {}), ("hybrid", {}), ("hybrid", {"cells": "map"})],
+    [
+        ("adaptive", {}),
+        ("ca", {}),
+        ("os", {"sweeps": 2}),
+        ("clutter_map", {}),
+        ("hybrid", {}),
+        ("hybrid", {"cells": "map"}),
+    ],
 )
 def test_a_block_that_is_not_on_the_grid_is_refused(name: str, setting: dict[str, Any]) -> None:
     part = build("detect", name, setting)
