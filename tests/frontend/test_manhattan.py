@@ -216,6 +216,9 @@ def test_one_cell_alone_is_its_own_weighted_centroid() -> None:
         ("runs", "row", 96),
         ("window", 1, -3),
         ("window", 2, 10**6),
+        ("latest", 0, 10**6),
+        ("latest", 1, 10**6),
+        ("latest", 1, -1),
     ],
 )
 def test_a_saved_state_that_cannot_be_true_is_refused(name: str, place: Any, value: int) -> None:
@@ -230,6 +233,8 @@ def test_a_saved_state_that_cannot_be_true_is_refused(name: str, place: Any, val
         saved[name][place] = value
     elif name == "runs":
         saved[name][place][saved["numbers"][3] - 1] = value
+    elif name == "latest":
+        saved[name][place, saved[name][0].argmax()] = value
     else:
         saved[name][saved[name][:, 0] >= 0, place] = value
     with pytest.raises(StateError):
