@@ -22,7 +22,8 @@ def wilson(hits: float, tries: float, level: float = 0.95) -> tuple[float, float
     middle = share + z * z / (2 * tries)
     half = z * sqrt(share * (1 - share) / tries + z * z / (4 * tries * tries))
     whole = 1 + z * z / tries
-    return max(0.0, (middle - half) / whole), min(1.0, (middle + half) / whole)
+    low, high = (middle - half) / whole, (middle + half) / whole
+    return low if hits > 0 else 0.0, high if hits < tries else 1.0  # exact, where rounding would leave a trace
 
 
 def mean_interval(values: NDArray[Any], level: float = 0.95) -> tuple[float, float]:
