@@ -75,7 +75,7 @@ def test_pixels_are_means_over_what_they_cover(
     frame = np.random.default_rng(seed).integers(0, 255, (azimuths, 400)).astype(np.uint8)
     east, north = distance * math.sin(azimuth), distance * math.cos(azimuth)
     made = scan_converted(frame, grid_of(site), (east, north), step=step, size=1)[0, 0]
-    assert made == pytest.approx(pixel(frame, grid_of(site), east, north, step), abs=2)
+    assert made == pytest.approx(pixel(frame, grid_of(site), east, north, step), abs=0.5)
 
 
 def test_far_away_it_is_bilinear_interpolation() -> None:

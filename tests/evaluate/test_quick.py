@@ -17,7 +17,6 @@ from tests.evaluate.checks import check, read_strictly
 
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
-@pytest.mark.skipif(not experiments(), reason="there is no experiment yet")
 def test_all_experiments_run_and_tell_what_they_found(tmp_path: Path) -> None:
     words = ["evaluate", "all", "--quick", "--jobs", "2", "--json", "all.json", "--report", ".", "--markdown", "all.md"]
     made = subprocess.run(
