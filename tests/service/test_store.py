@@ -286,7 +286,7 @@ def test_what_the_database_refuses_does_not_take_the_rest_with_it(sqlite_url: st
         service.step(T0)
         until(lambda: store.writer_counters()["refused"] == 1, "the refused one is counted")
         until(lambda: store.writer_counters()["points"] == 12, "the rest is written")
-        assert [one["id"] for one in store.alerts(None, None, None)] == [3, 1]
+        until(lambda: [one["id"] for one in store.alerts(None, None, None)] == [3, 1], "the refused one waits no more")
 
 
 def test_recording_does_not_fail_with_the_writer_gone(sqlite_url: str) -> None:
