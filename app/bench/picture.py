@@ -7,10 +7,10 @@ from collections.abc import Callable
 from app.assembly import node_site, radar_chain, radar_site, surface_engine
 from app.demo.scene import demo_settings, demo_world
 from app.settings import Settings
-from pipeline.measure.picture_quality import Score, picture_quality
-from pipeline.simulate.nodes import NodeSimulator
-from pipeline.simulate.reports import ReportSimulator
-from pipeline.simulate.video import VideoSimulator
+from pipeline.lab.measure.picture_quality import Score, picture_quality
+from pipeline.lab.simulate.nodes import NodeSimulator
+from pipeline.lab.simulate.reports import ReportSimulator
+from pipeline.lab.simulate.video import VideoSimulator
 
 START = 1_700_000_000.0
 

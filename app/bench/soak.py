@@ -22,8 +22,8 @@ from app.live.hub import Hub
 from app.service import SurfaceService
 from app.settings import Settings, load
 from app.store.store import Store
-from pipeline.simulate.reports import ReportSimulator
-from pipeline.simulate.video import VideoSimulator
+from pipeline.lab.simulate.reports import ReportSimulator
+from pipeline.lab.simulate.video import VideoSimulator
 from pipeline.tables import Sweeps
 
 BLOCKS = 32

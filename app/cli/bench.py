@@ -9,7 +9,7 @@ import typer
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from pipeline.measure.picture_quality import Score
+    from pipeline.lab.measure.picture_quality import Score
 
 
 def register(app: typer.Typer) -> None:
@@ -77,7 +77,7 @@ def soak(
 def _tracker(peers: bool) -> tuple[str, ...]:
     import time
 
-    from pipeline.measure.bench_tracker import bench_tracker
+    from pipeline.lab.measure.bench_tracker import bench_tracker
 
     return ("Tracker, 1000 targets, one turn", *bench_tracker(time.perf_counter, compare=peers).lines())
 
@@ -120,7 +120,7 @@ def _front_end(repeats: int, peers: bool) -> Table:
 
     from rich.table import Table
 
-    from pipeline.measure.bench_frontend import bench_frontend
+    from pipeline.lab.measure.bench_frontend import bench_frontend
 
     table = Table(title="Radar front end, one turn of 4096 x 1024 x 8 bit", title_justify="left")
     figures = ("ms", "least", "x read once", "wanted")

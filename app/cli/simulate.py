@@ -31,7 +31,7 @@ def traffic(
     from app.console import fail
     from app.demo.traffic import prepare, write_recording
     from pipeline.airport.geojson import AirportFault
-    from pipeline.simulate.recording import RecordingError
+    from pipeline.lab.simulate.recording import RecordingError
 
     console = Console()
     try:

@@ -17,11 +17,11 @@ from app.demo.sender import DatagramSender
 from app.settings import Settings, load
 from pipeline.airport.model import Airport
 from pipeline.asterix.cat240 import encode_sweeps
-from pipeline.simulate.nodes import NodeSimulator
-from pipeline.simulate.rain import shower
-from pipeline.simulate.reports import ReportSimulator
-from pipeline.simulate.video import SECTORS, VideoSimulator
-from pipeline.simulate.world import World
+from pipeline.lab.simulate.nodes import NodeSimulator
+from pipeline.lab.simulate.rain import shower
+from pipeline.lab.simulate.reports import ReportSimulator
+from pipeline.lab.simulate.video import SECTORS, VideoSimulator
+from pipeline.lab.simulate.world import World
 from pipeline.sites import NodeSite, RadarSite
 from pipeline.tables import NodeEvents, TargetReports
 

@@ -13,9 +13,9 @@ from app.demo.feed import VideoChannel
 from app.demo.pcap import PcapWriter
 from app.demo.scene import demo_settings, demo_world
 from app.settings import Settings
-from pipeline.simulate.rain import shower
-from pipeline.simulate.video import SECTORS, VideoSimulator
-from pipeline.simulate.world import World
+from pipeline.lab.simulate.rain import shower
+from pipeline.lab.simulate.video import SECTORS, VideoSimulator
+from pipeline.lab.simulate.world import World
 
 _TRUTH = (
     "id", "east", "north", "altitude", "heading", "speed", "length", "width", "category", "callsign", "address",

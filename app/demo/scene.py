@@ -11,10 +11,10 @@ from app.airports import load_airport
 from app.demo.traffic import load_recording
 from app.settings import NodeSettings, RadarSettings, RunwaySettings, Settings, SettingsError, UdpSettings
 from pipeline.airport.model import Airport
-from pipeline.simulate.nodes import node_sites
-from pipeline.simulate.recording import Recording, RecordingError
-from pipeline.simulate.scenes import synthetic_world
-from pipeline.simulate.world import World, build_world
+from pipeline.lab.simulate.nodes import node_sites
+from pipeline.lab.simulate.recording import Recording, RecordingError
+from pipeline.lab.simulate.scenes import synthetic_world
+from pipeline.lab.simulate.world import World, build_world
 
 PLACES = {"LFPO": (-100.0, -500.0, 40.0)}
 """Where the radar stands: east, north, height of the antenna (m). At Orly most runway is in sight from there."""

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.airport.model import Airport
-from pipeline.simulate.recording import Recording, RecordingError, cut, from_document, to_document
-from pipeline.simulate.traffic import CleaningReport, busiest_window, clean
+from pipeline.lab.simulate.recording import Recording, RecordingError, cut, from_document, to_document
+from pipeline.lab.simulate.traffic import CleaningReport, busiest_window, clean
 
 SHIPPED = Path(__file__).resolve().parent.parent / "data" / "traffic"
 LARGEST = 512 * 1024 * 1024

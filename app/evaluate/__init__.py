@@ -1,1 +1,1 @@
-"""`airside evaluate`: runs the experiments of `pipeline.evaluate` and tells what they found, on screen and on paper."""
+"""`airside evaluate`: runs the experiments of `pipeline.lab.evaluate` and tells what they found."""

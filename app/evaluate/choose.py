@@ -6,8 +6,8 @@ import difflib
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from pipeline import evaluate
-from pipeline.evaluate import Experiment, RecordedVideo
+from pipeline.lab import evaluate
+from pipeline.lab.evaluate import Experiment, RecordedVideo
 
 ALL = "all"
 

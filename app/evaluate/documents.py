@@ -12,7 +12,7 @@ from typing import Any
 from app.evaluate import words
 from app.evaluate.circumstances import Circumstances
 from app.evaluate.runs import Run
-from pipeline.evaluate import Row
+from pipeline.lab.evaluate import Row
 
 
 def document(run: Run) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from app.evaluate import words
-from pipeline.evaluate import Row
+from pipeline.lab.evaluate import Row
 
 WIDE, EDGE = 132.0, 8.0
 

@@ -10,7 +10,7 @@ from app.evaluate import plots, words
 from app.evaluate.circumstances import Circumstances
 from app.evaluate.gauge import gauge, key
 from app.evaluate.runs import EvaluationError, Run
-from pipeline.evaluate import Figure, Row
+from pipeline.lab.evaluate import Figure, Row
 
 CHIPS = {
     "reproduced": ("good", "✓"),

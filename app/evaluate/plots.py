@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from numpy.typing import NDArray
 
-from pipeline.evaluate import Figure, Line, Picture
+from pipeline.lab.evaluate import Figure, Line, Picture
 
 SERIES = 8
 """Colours of lines, `--s0` and on, of the page's style sheet."""

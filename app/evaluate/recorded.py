@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from app.ingest.recording import RecordingError, number_of, turns_of, video_format
-from pipeline.evaluate import RecordedVideo
+from pipeline.lab.evaluate import RecordedVideo
 
 
 def recorded_video(path: Path) -> RecordedVideo:

@@ -17,7 +17,7 @@ from typing import Any, Literal
 import joblib
 import numpy as np
 
-from pipeline.evaluate import Experiment, Figure, Row, Trial
+from pipeline.lab.evaluate import Experiment, Figure, Row, Trial
 
 Backend = Literal["loky", "threading", "dask"]
 BACKENDS: tuple[Backend, ...] = ("loky", "threading", "dask")

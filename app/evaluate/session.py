@@ -19,7 +19,7 @@ from app.evaluate.documents import document, json_text, markdown, write_whole
 from app.evaluate.recorded import name_of, recorded_video
 from app.evaluate.runs import EvaluationError, Run, carry_out, usable_backend
 from app.evaluate.table import summary, told
-from pipeline.evaluate import Experiment
+from pipeline.lab.evaluate import Experiment
 
 PLAIN_WIDTH = 160
 """Characters a line where there is no terminal that says how wide it is."""

@@ -12,7 +12,7 @@ from rich.text import Text
 from app.evaluate import words
 from app.evaluate.choose import needs_video
 from app.evaluate.runs import Run
-from pipeline import evaluate
+from pipeline.lab import evaluate
 
 STYLES = {
     "reproduced": "green",

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from app.evaluate.runs import Run
-from pipeline.evaluate import Experiment, RecordedVideo, Row
+from pipeline.lab.evaluate import Experiment, RecordedVideo, Row
 
 TOLD_APART = ("title", "source", "reading", "trials")
 """Fields of an experiment that are told elsewhere than among its settings."""

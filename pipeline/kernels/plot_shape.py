@@ -16,7 +16,7 @@ from pipeline.tables import Plots
 PLACED = 0.012
 """Part of the cells' own spread by which the middle of a target strays from that of its echo, however strong: the echo
 does not weigh nose and tail alike, nor the near side and the far one. Rather more than dense scatterers want (0.0075):
-with a few strong ones (`pipeline.simulate.scatter`) it strays farther."""
+with a few strong ones (`pipeline.lab.simulate.scatter`) it strays farther."""
 
 LOST = 0.7
 """Part of the cells' own spread that a target loses with the parts of it that are not detected."""
@@ -136,7 +136,7 @@ def position_variance(
     share: PLACED, and what is lost with parts that were not detected: all the more, the less the cells exceed what is
     detected, and the fewer independent ones there are. The variances: of a resolution cell, divided by how many there
     are, and what polar cells, denser on the near side, pull the centroid towards the radar. The form is ours; its
-    constants were fitted to targets of many kinds at 100 to 2,500 m and 16 to 30 dB (`pipeline.simulate.closeup`).
+    constants were fitted to targets of many kinds at 100 to 2,500 m and 16 to 30 dB (`pipeline.lab.simulate.closeup`).
     independent: resolution cells in the plot.
     """
     step, azimuth_step, beam = constants[3], constants[4], constants[5]

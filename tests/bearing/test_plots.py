@@ -16,7 +16,7 @@ from pipeline.bearing.of_plots import MOST_A_PART, Expectations, PlotBearings
 from pipeline.chain import RadarChain
 from pipeline.detect.hybrid import Hybrid
 from pipeline.extract.manhattan import Manhattan
-from pipeline.simulate.closeup import CLOSEUP_TYPES, Posed, closeup
+from pipeline.lab.simulate.closeup import CLOSEUP_TYPES, Posed, closeup
 from pipeline.sites import RadarSite
 from pipeline.tables import Plots, Sweeps, VideoFormat
 from tests.bearing.scene import axis_error

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.evaluate import Trial, experiments
-from pipeline.evaluate.bearing import METHODS, SLOW, BearingExperiment
+from pipeline.lab.evaluate import Trial, experiments
+from pipeline.lab.evaluate.bearing import METHODS, SLOW, BearingExperiment
 from tests.bearing.scene import axis_error
 
 FEW = BearingExperiment(trials=4, types=("B734",), ranges_m=(400.0, 1000.0), template_every=4)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from pipeline.evaluate import Experiment, experiments
-from pipeline.evaluate.cfar_cases import (
+from pipeline.lab.evaluate import Experiment, experiments
+from pipeline.lab.evaluate.cfar_cases import (
     CASES,
     Watch,
     every_part,
@@ -19,13 +19,13 @@ from pipeline.evaluate.cfar_cases import (
     margins,
     shift_for,
 )
-from pipeline.evaluate.cfar_clutter import CfarClutter
-from pipeline.evaluate.cfar_law import Law, swerling3_draw
-from pipeline.evaluate.cfar_rain import CfarRain
-from pipeline.evaluate.cfar_scenes import CfarScenes, ground_of
-from pipeline.evaluate.cfar_table1 import TABLE, CfarTable1, predicted
-from pipeline.evaluate.cfar_targets import FAST, KINDS, POINT, SHIFTS, SLOW, detection, place
-from pipeline.evaluate.ground import ASPHALT, WEAK, Ground
+from pipeline.lab.evaluate.cfar_clutter import CfarClutter
+from pipeline.lab.evaluate.cfar_law import Law, swerling3_draw
+from pipeline.lab.evaluate.cfar_rain import CfarRain
+from pipeline.lab.evaluate.cfar_scenes import CfarScenes, ground_of
+from pipeline.lab.evaluate.cfar_table1 import TABLE, CfarTable1, predicted
+from pipeline.lab.evaluate.cfar_targets import FAST, KINDS, POINT, SHIFTS, SLOW, detection, place
+from pipeline.lab.evaluate.ground import ASPHALT, WEAK, Ground
 from pipeline.parts import available
 
 HYBRID = tuple(case for case in CASES if case.label == "hybrid")

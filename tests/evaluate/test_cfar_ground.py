@@ -9,9 +9,9 @@ import pytest
 from scipy.stats import binom
 
 from pipeline.airport.model import SurfaceKind
-from pipeline.evaluate.cfar_law import Law, swerling3_draw, swerling3_survival
-from pipeline.evaluate.ground import ASPHALT, STRONG, SURFACES, WEAK, Ground, Rain, _draw
-from pipeline.evaluate.statistics import mean_interval, rms_interval, wilson
+from pipeline.lab.evaluate.cfar_law import Law, swerling3_draw, swerling3_survival
+from pipeline.lab.evaluate.ground import ASPHALT, STRONG, SURFACES, WEAK, Ground, Rain, _draw
+from pipeline.lab.evaluate.statistics import mean_interval, rms_interval, wilson
 
 LAWS = [Law(), Law("weibull", 1.2), Law("weibull", 1.6), Law("k", 1.0), Law("k", 5.0)]
 

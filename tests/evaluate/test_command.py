@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-import pipeline.evaluate
+import pipeline.lab.evaluate
 from app.cli import app
 from app.evaluate.recorded import recorded_video
 from app.evaluate.runs import carry_out
@@ -32,7 +32,7 @@ def toys(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def only_toys(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
-    monkeypatch.setattr(pipeline.evaluate, "experiments", lambda: {name: TOYS[name] for name in names})
+    monkeypatch.setattr(pipeline.lab.evaluate, "experiments", lambda: {name: TOYS[name] for name in names})
 
 
 def evaluate(*words: str | Path) -> Result:
@@ -286,9 +286,9 @@ def test_files_that_are_no_recording(tmp_path: Path) -> None:
 def test_an_interrupt_ends_it_cleanly(tmp_path: Path) -> None:
     script = (
         "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "import app, pipeline.evaluate\n"
+        "import app, pipeline.lab.evaluate\n"
         "from tests.evaluate.toy import Slow\n"
-        "pipeline.evaluate.experiments = lambda: {'slow': Slow}\n"
+        "pipeline.lab.evaluate.experiments = lambda: {'slow': Slow}\n"
         "from app.cli import app as command\n"
         f"command(['evaluate', 'slow', '--trials', '1000', '--jobs', '2', '--json', {str(tmp_path / 'x.json')!r}])\n"
     )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from pipeline.evaluate.extraction import ALONE, MERGED, NEES, PAIRS, SPLIT, Extraction
+from pipeline.lab.evaluate.extraction import ALONE, MERGED, NEES, PAIRS, SPLIT, Extraction
 
 SMALL = replace(Extraction(), trials=12, ranges_m=(400.0, 1000.0), snr_db=(22.0,))
 

@@ -16,7 +16,7 @@ from app.evaluate.gauge import gauge
 from app.evaluate.page import page
 from app.evaluate.plots import looks, svg
 from app.evaluate.runs import carry_out
-from pipeline.evaluate import Figure, Line, Row
+from pipeline.lab.evaluate import Figure, Line, Row
 from tests.evaluate.toy import Toy
 
 ABOUT = circumstances("airside evaluate all --seed 1 --quick")

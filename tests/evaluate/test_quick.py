@@ -11,7 +11,7 @@ import pytest
 
 from app.evaluate.choose import needs_video
 from app.kernel_cache import ROOT
-from pipeline.evaluate import experiments
+from pipeline.lab.evaluate import experiments
 from tests.evaluate.checks import check, read_strictly
 
 

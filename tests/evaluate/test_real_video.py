@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from pipeline.assemble.bit_depth import to_octets
-from pipeline.evaluate import RecordedVideo
-from pipeline.evaluate.cfar_cases import CASES, every_part
-from pipeline.evaluate.real_video import RealVideo, _overlapping, fixed_things, video_format
+from pipeline.lab.evaluate import RecordedVideo
+from pipeline.lab.evaluate.cfar_cases import CASES, every_part
+from pipeline.lab.evaluate.real_video import RealVideo, _overlapping, fixed_things, video_format
 
 THINGS = ((10, 30), (40, 60), (70, 100))
 

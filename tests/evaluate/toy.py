@@ -10,7 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from pipeline.evaluate import Figure, Line, Picture, RecordedVideo, Row, Trial
+from pipeline.lab.evaluate import Figure, Line, Picture, RecordedVideo, Row, Trial
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ import itertools
 
 import pytest
 
-from pipeline.measure.bench_frontend import bench_frontend
-from pipeline.measure.stopwatch import BenchRow
+from pipeline.lab.measure.bench_frontend import bench_frontend
+from pipeline.lab.measure.stopwatch import BenchRow
 from pipeline.parts import available
 
 

@@ -10,8 +10,8 @@ import pytest
 from app.bench.picture import START, demo_quality
 from app.demo.scene import demo_settings, demo_world
 from app.settings import Settings
-from pipeline.measure.picture_quality import PictureScorer, QualityRow, Score
-from pipeline.simulate.world import World
+from pipeline.lab.measure.picture_quality import PictureScorer, QualityRow, Score
+from pipeline.lab.simulate.world import World
 from pipeline.tables import Tracks
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.simulate.closeup import CLOSEUP_TYPES, Closeup, Posed, closeup
+from pipeline.lab.simulate.closeup import CLOSEUP_TYPES, Closeup, Posed, closeup
 from pipeline.tables import VideoFormat
 
 VIDEO = VideoFormat()

@@ -28,8 +28,8 @@ from app.ingest.recordings import open_recording
 from app.settings import Settings, SettingsError, load
 from pipeline.airport.model import Airport
 from pipeline.asterix.cat240 import VideoMessage, decode
-from pipeline.simulate.recording import RecordingError
-from pipeline.simulate.video import VideoSimulator
+from pipeline.lab.simulate.recording import RecordingError
+from pipeline.lab.simulate.video import VideoSimulator
 from pipeline.sites import NodeSite, RadarSite
 from pipeline.tables import NodeEvents, TargetReports
 from tests.simulate.test_traffic import row

@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.simulate.nodes import NodeBehaviour, NodeSimulator, node_sites
-from pipeline.simulate.paths import Movement, Paths, Truth
-from pipeline.simulate.reports import ReportSimulator
-from pipeline.simulate.types import TYPES
+from pipeline.lab.simulate.nodes import NodeBehaviour, NodeSimulator, node_sites
+from pipeline.lab.simulate.paths import Movement, Paths, Truth
+from pipeline.lab.simulate.reports import ReportSimulator
+from pipeline.lab.simulate.types import TYPES
 from pipeline.sites import NodeSite
 from pipeline.tables import NodeEventKind, NodeEvents, TargetReports
 from tests.simulate.field import airport

@@ -6,9 +6,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.simulate.recording import Recording, RecordingError, cut, from_document, recorded_movements, to_document
-from pipeline.simulate.traffic import CleaningRules, Trajectory, busiest_window, clean, motion
-from pipeline.simulate.types import TYPES, type_of
+from pipeline.lab.simulate.recording import (
+    Recording,
+    RecordingError,
+    cut,
+    from_document,
+    recorded_movements,
+    to_document,
+)
+from pipeline.lab.simulate.traffic import CleaningRules, Trajectory, busiest_window, clean, motion
+from pipeline.lab.simulate.types import TYPES, type_of
 from tests.simulate.field import FRAME
 
 START = 1_600_000_000.0

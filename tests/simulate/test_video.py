@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from pipeline.airport.model import SurfaceKind
-from pipeline.simulate.clutter import NAMES as GROUND_NAMES
-from pipeline.simulate.clutter import SHAPES, PowerLaw, quantiles
-from pipeline.simulate.paths import Truth
-from pipeline.simulate.rain import RainCell, shower
-from pipeline.simulate.scatter import centres
-from pipeline.simulate.types import TYPES
-from pipeline.simulate.video import VideoSimulator
+from pipeline.lab.simulate.clutter import NAMES as GROUND_NAMES
+from pipeline.lab.simulate.clutter import SHAPES, PowerLaw, quantiles
+from pipeline.lab.simulate.paths import Truth
+from pipeline.lab.simulate.rain import RainCell, shower
+from pipeline.lab.simulate.scatter import centres
+from pipeline.lab.simulate.types import TYPES
+from pipeline.lab.simulate.video import VideoSimulator
 from tests.simulate.field import airport, one_target, radar, uniform
 
 DB = 0.3125

@@ -9,11 +9,11 @@ import pytest
 from app.airports import load_airport
 from app.demo.traffic import load_recording
 from pipeline.airport.model import Airport
-from pipeline.simulate.incidents import approaches, script
-from pipeline.simulate.paths import Movement, Paths
-from pipeline.simulate.scenes import synthetic_world
-from pipeline.simulate.vehicles import distances, lap, service_roads, taxi_runs
-from pipeline.simulate.world import World, build_world
+from pipeline.lab.simulate.incidents import approaches, script
+from pipeline.lab.simulate.paths import Movement, Paths
+from pipeline.lab.simulate.scenes import synthetic_world
+from pipeline.lab.simulate.vehicles import distances, lap, service_roads, taxi_runs
+from pipeline.lab.simulate.world import World, build_world
 from pipeline.tables import TargetClass
 from tests.simulate.field import airport as field
 

@@ -10,10 +10,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.evaluate import Figure, Line, Picture, Row, Trial
-from pipeline.evaluate.cfar_cases import BINS, Case, Watch, every_part, false_alarms, labels, margins, shift_for
-from pipeline.evaluate.cfar_law import Law
-from pipeline.evaluate.cfar_targets import (
+from pipeline.lab.evaluate import Figure, Line, Picture, Row, Trial
+from pipeline.lab.evaluate.cfar_cases import BINS, Case, Watch, every_part, false_alarms, labels, margins, shift_for
+from pipeline.lab.evaluate.cfar_law import Law
+from pipeline.lab.evaluate.cfar_targets import (
     BESIDE,
     EXTENDED,
     FAST,
@@ -25,8 +25,8 @@ from pipeline.evaluate.cfar_targets import (
     detection,
     place,
 )
-from pipeline.evaluate.ground import SURFACES, Ground, Scene
-from pipeline.evaluate.statistics import mean_interval
+from pipeline.lab.evaluate.ground import SURFACES, Ground, Scene
+from pipeline.lab.evaluate.statistics import mean_interval
 
 HOMOGENEOUS, HETEROGENEOUS, HELD_OUT_SCENE = SCENES = ("homogeneous", "heterogeneous", "held out")
 JUDGED = (BESIDE, EXTENDED, POINT, SLOW, FAST)

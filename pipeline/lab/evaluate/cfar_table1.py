@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from pipeline.detect.calibration import LOG_MEAN_DB, estimation_loss_db, threshold_offset_db
 from pipeline.detect.hybrid import Hybrid
-from pipeline.evaluate import Figure, Line, Row, Trial
-from pipeline.evaluate.cfar_law import swerling3_draw, swerling3_survival
-from pipeline.evaluate.statistics import mean_interval, rms_interval
+from pipeline.lab.evaluate import Figure, Line, Row, Trial
+from pipeline.lab.evaluate.cfar_law import swerling3_draw, swerling3_survival
+from pipeline.lab.evaluate.statistics import mean_interval, rms_interval
 from pipeline.tables import Sweeps, VideoFormat
 
 MACRO_CELL = VideoFormat(azimuths=16, ranges=25, beamwidth_rad=2 * np.pi / 16)

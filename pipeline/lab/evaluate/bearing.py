@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, label
 
 from pipeline.bearing import Expected, TargetView
-from pipeline.evaluate import Figure, Line, Picture, Row, Trial
-from pipeline.evaluate.statistics import mean_interval, rms_interval, wilson
 from pipeline.kernels.scan_convert import grid_of, scan_converted
+from pipeline.lab.evaluate import Figure, Line, Picture, Row, Trial
+from pipeline.lab.evaluate.statistics import mean_interval, rms_interval, wilson
+from pipeline.lab.simulate.closeup import CLOSEUP_TYPES, Posed, closeup
 from pipeline.parts import build
-from pipeline.simulate.closeup import CLOSEUP_TYPES, Posed, closeup
 from pipeline.sites import RadarSite
 from pipeline.tables import VideoFormat
 

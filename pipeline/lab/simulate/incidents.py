@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from shapely.geometry import LineString, Point
 
 from pipeline.airport.model import Airport, HoldingPosition, Runway
-from pipeline.simulate.paths import Movement
-from pipeline.simulate.traffic import motion
-from pipeline.simulate.vehicles import along, distances
+from pipeline.lab.simulate.paths import Movement
+from pipeline.lab.simulate.traffic import motion
+from pipeline.lab.simulate.vehicles import along, distances
 
 Floats = NDArray[np.float64]
 STANDS_BEFORE = 15

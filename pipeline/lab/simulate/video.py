@@ -9,10 +9,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.airport.model import Airport
-from pipeline.simulate.clutter import FINE, ClutterMap, PowerLaw, build_clutter, quantiles
-from pipeline.simulate.paths import Truth
-from pipeline.simulate.rain import RainCell, rain_power
-from pipeline.simulate.scatter import catalogue
+from pipeline.lab.simulate.clutter import FINE, ClutterMap, PowerLaw, build_clutter, quantiles
+from pipeline.lab.simulate.paths import Truth
+from pipeline.lab.simulate.rain import RainCell, rain_power
+from pipeline.lab.simulate.scatter import catalogue
 from pipeline.sites import RadarSite
 
 SECTORS = 64

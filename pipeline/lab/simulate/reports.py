@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.simulate.paths import Truth
+from pipeline.lab.simulate.paths import Truth
 from pipeline.tables import TargetClass, TargetReports
 
 VEHICLE_ERROR = 2.5

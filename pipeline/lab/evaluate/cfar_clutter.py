@@ -9,11 +9,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.evaluate import Figure, Line, Row, Trial
-from pipeline.evaluate.cfar_cases import CLAIRVOYANT, Case, Watch, every_part, false_alarms, margins
-from pipeline.evaluate.cfar_law import Law
-from pipeline.evaluate.ground import Ground
-from pipeline.evaluate.statistics import mean_interval
+from pipeline.lab.evaluate import Figure, Line, Row, Trial
+from pipeline.lab.evaluate.cfar_cases import CLAIRVOYANT, Case, Watch, every_part, false_alarms, margins
+from pipeline.lab.evaluate.cfar_law import Law
+from pipeline.lab.evaluate.ground import Ground
+from pipeline.lab.evaluate.statistics import mean_interval
 
 LAWS = (
     Law(),

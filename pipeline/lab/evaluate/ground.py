@@ -22,7 +22,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import gammaln
 
 from pipeline.airport.model import SurfaceKind
-from pipeline.evaluate.cfar_law import DB, Law, swerling3_draw
+from pipeline.lab.evaluate.cfar_law import DB, Law, swerling3_draw
 from pipeline.tables import Sweeps, VideoFormat
 
 SURFACES = ("asphalt", "weak grass", "strong grass", "building")

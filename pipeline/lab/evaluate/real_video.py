@@ -13,9 +13,9 @@ from scipy.ndimage import label
 from scipy.spatial import cKDTree
 
 from pipeline.assemble.bit_depth import to_octets
-from pipeline.evaluate import Figure, Line, Picture, RecordedVideo, Row, Trial
-from pipeline.evaluate.cfar_cases import Case, every_part
-from pipeline.evaluate.statistics import mean_interval, wilson
+from pipeline.lab.evaluate import Figure, Line, Picture, RecordedVideo, Row, Trial
+from pipeline.lab.evaluate.cfar_cases import Case, every_part
+from pipeline.lab.evaluate.statistics import mean_interval, wilson
 from pipeline.parts import build
 from pipeline.sites import RadarSite
 from pipeline.tables import Sweeps, VideoFormat

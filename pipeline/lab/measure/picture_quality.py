@@ -18,12 +18,12 @@ from pipeline.airport.model import SurfaceKind
 from pipeline.airport.zones import ZoneMap
 from pipeline.chain import RadarChain
 from pipeline.engine import SurfaceEngine
+from pipeline.lab.simulate.nodes import NodeSimulator
+from pipeline.lab.simulate.paths import Truth
+from pipeline.lab.simulate.reports import ReportSimulator
+from pipeline.lab.simulate.video import VideoSimulator
+from pipeline.lab.simulate.world import World
 from pipeline.picture import AlertChange
-from pipeline.simulate.nodes import NodeSimulator
-from pipeline.simulate.paths import Truth
-from pipeline.simulate.reports import ReportSimulator
-from pipeline.simulate.video import VideoSimulator
-from pipeline.simulate.world import World
 from pipeline.tables import Sweeps, TargetClass, Tracks
 
 Array = NDArray[Any]

@@ -9,13 +9,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.evaluate import Figure, Line, Row, Trial
-from pipeline.evaluate.cfar_cases import BINS, Case, Watch, every_part, false_alarms, labels, margins, shift_for
-from pipeline.evaluate.cfar_law import Law
-from pipeline.evaluate.cfar_scenes import HELD_OUT_SCENE, HETEROGENEOUS, ground_of
-from pipeline.evaluate.cfar_targets import POINT, SHIFTS, Numbers, detection, place
-from pipeline.evaluate.ground import Rain, Scene
-from pipeline.evaluate.statistics import mean_interval
+from pipeline.lab.evaluate import Figure, Line, Row, Trial
+from pipeline.lab.evaluate.cfar_cases import BINS, Case, Watch, every_part, false_alarms, labels, margins, shift_for
+from pipeline.lab.evaluate.cfar_law import Law
+from pipeline.lab.evaluate.cfar_scenes import HELD_OUT_SCENE, HETEROGENEOUS, ground_of
+from pipeline.lab.evaluate.cfar_targets import POINT, SHIFTS, Numbers, detection, place
+from pipeline.lab.evaluate.ground import Rain, Scene
+from pipeline.lab.evaluate.statistics import mean_interval
 
 
 @dataclass(frozen=True)

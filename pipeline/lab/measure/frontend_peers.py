@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from pipeline.measure.frontend_workload import VIDEO, Workload
-from pipeline.measure.stopwatch import BenchRow, Stopwatch
+from pipeline.lab.measure.frontend_workload import VIDEO, Workload
+from pipeline.lab.measure.stopwatch import BenchRow, Stopwatch
 
 
 def peers(watch: Stopwatch, work: Workload) -> Iterator[BenchRow]:

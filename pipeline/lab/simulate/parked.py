@@ -10,8 +10,8 @@ from shapely import STRtree, distance
 from shapely.geometry import Point
 
 from pipeline.airport.model import Airport
-from pipeline.simulate.paths import Movement
-from pipeline.simulate.types import TYPES
+from pipeline.lab.simulate.paths import Movement
+from pipeline.lab.simulate.types import TYPES
 
 _TYPES = ("A320", "B738", "E190", "A321")
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 
-from pipeline.evaluate.cfar_law import swerling3_survival
-from pipeline.evaluate.ground import ASPHALT, WEAK, Scene
+from pipeline.lab.evaluate.cfar_law import swerling3_survival
+from pipeline.lab.evaluate.ground import ASPHALT, WEAK, Scene
 
 BESIDE, EXTENDED, POINT, SLOW, FAST, GRASS = range(6)
 KINDS = (

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from pipeline.chain import RadarChain
 from pipeline.detect import Detector
 from pipeline.extract import Extractor
-from pipeline.measure.frontend_peers import peers as peer_rows
-from pipeline.measure.frontend_workload import (
+from pipeline.lab.measure.frontend_peers import peers as peer_rows
+from pipeline.lab.measure.frontend_workload import (
     FRAMES,
     VIDEO,
     Workload,
@@ -29,7 +29,7 @@ from pipeline.measure.frontend_workload import (
     turn_of,
     workload,
 )
-from pipeline.measure.stopwatch import BenchRow, Stopwatch, read_once
+from pipeline.lab.measure.stopwatch import BenchRow, Stopwatch, read_once
 from pipeline.parts import available, build
 from pipeline.sites import RadarSite
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.detect import Detector
-from pipeline.evaluate.cfar_law import Law
-from pipeline.evaluate.ground import Scene
+from pipeline.lab.evaluate.cfar_law import Law
+from pipeline.lab.evaluate.ground import Scene
 from pipeline.parts import available, build
 from pipeline.tables import Sweeps
 

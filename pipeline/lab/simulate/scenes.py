@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.airport.model import Airport
-from pipeline.simulate.paths import Movement, Paths
-from pipeline.simulate.types import NAMES, TYPES
-from pipeline.simulate.vehicles import lap, service_roads, taxi_runs
-from pipeline.simulate.world import World
+from pipeline.lab.simulate.paths import Movement, Paths
+from pipeline.lab.simulate.types import NAMES, TYPES
+from pipeline.lab.simulate.vehicles import lap, service_roads, taxi_runs
+from pipeline.lab.simulate.world import World
 from pipeline.tables import TargetClass
 
 _SHARE_OF_AIRCRAFT = 0.6

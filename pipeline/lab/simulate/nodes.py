@@ -14,7 +14,7 @@ from shapely.geometry import Point
 from shapely.ops import unary_union
 
 from pipeline.airport.model import Airport
-from pipeline.simulate.paths import Truth
+from pipeline.lab.simulate.paths import Truth
 from pipeline.sites import NodeSite
 from pipeline.tables import NodeEventKind, NodeEvents, TargetClass
 

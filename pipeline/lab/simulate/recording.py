@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.airport.frame import LocalFrame
-from pipeline.simulate.paths import Movement
-from pipeline.simulate.traffic import Trajectory, motion
-from pipeline.simulate.types import TYPES, type_of
+from pipeline.lab.simulate.paths import Movement
+from pipeline.lab.simulate.traffic import Trajectory, motion
+from pipeline.lab.simulate.types import TYPES, type_of
 
 Floats = NDArray[np.float64]
 

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from pipeline import parts
 from pipeline.detect.calibration import threshold_offset_db
-from pipeline.evaluate import Figure, Line, Picture, Row, Trial
-from pipeline.evaluate.statistics import mean_interval, rms_interval, wilson
 from pipeline.extract import Extractor
-from pipeline.simulate.closeup import CLOSEUP_TYPES, Closeup, Posed, closeup
+from pipeline.lab.evaluate import Figure, Line, Picture, Row, Trial
+from pipeline.lab.evaluate.statistics import mean_interval, rms_interval, wilson
+from pipeline.lab.simulate.closeup import CLOSEUP_TYPES, Closeup, Posed, closeup
 from pipeline.sites import RadarSite
 from pipeline.tables import Detections, Plots, Sweeps, VideoFormat
 

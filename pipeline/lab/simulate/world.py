@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.airport.model import Airport
-from pipeline.simulate.incidents import Incident, Use, script, uses
-from pipeline.simulate.parked import parked
-from pipeline.simulate.paths import Movement, Paths, Truth
-from pipeline.simulate.recording import Recording, recorded_movements
-from pipeline.simulate.vehicles import vehicles
+from pipeline.lab.simulate.incidents import Incident, Use, script, uses
+from pipeline.lab.simulate.parked import parked
+from pipeline.lab.simulate.paths import Movement, Paths, Truth
+from pipeline.lab.simulate.recording import Recording, recorded_movements
+from pipeline.lab.simulate.vehicles import vehicles
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from shapely.geometry import LineString
 from shapely.ops import substring, unary_union
 
 from pipeline.airport.model import Airport
-from pipeline.simulate.paths import Movement
+from pipeline.lab.simulate.paths import Movement
 
 Floats = NDArray[np.float64]
 

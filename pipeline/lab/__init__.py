@@ -1,0 +1,1 @@
+"""The laboratory: simulation, measurement and the experiments. Nothing in `pipeline/` outside it imports it."""
