@@ -15,7 +15,7 @@ from pipeline.kernels.correlate import explained
 from pipeline.kernels.echo import Echo
 from pipeline.kernels.planform import Planform, Templates, templates
 from pipeline.kernels.scan_convert import grid_of
-from pipeline.lab.simulate.types import TYPES
+from pipeline.reference.types import TYPES
 from pipeline.sites import RadarSite
 from pipeline.state import read_only
 from pipeline.tables import TargetClass, VideoFormat

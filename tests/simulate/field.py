@@ -11,7 +11,7 @@ from shapely.geometry import LineString, Point, box
 from pipeline.airport.frame import LocalFrame
 from pipeline.airport.model import Airport, Feature, HoldingPosition, Runway, RunwayEnd, SurfaceKind, TaxiGraph
 from pipeline.lab.simulate.paths import Truth
-from pipeline.lab.simulate.types import NAMES, TYPES
+from pipeline.reference.types import NAMES, TYPES
 from pipeline.sites import RadarSite
 from pipeline.tables import VideoFormat
 

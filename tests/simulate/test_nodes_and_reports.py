@@ -9,7 +9,7 @@ import pytest
 from pipeline.lab.simulate.nodes import NodeBehaviour, NodeSimulator, node_sites
 from pipeline.lab.simulate.paths import Movement, Paths, Truth
 from pipeline.lab.simulate.reports import ReportSimulator
-from pipeline.lab.simulate.types import TYPES
+from pipeline.reference.types import TYPES
 from pipeline.sites import NodeSite
 from pipeline.tables import NodeEventKind, NodeEvents, TargetReports
 from tests.simulate.field import airport

@@ -15,7 +15,7 @@ from pipeline.lab.simulate.recording import (
     to_document,
 )
 from pipeline.lab.simulate.traffic import CleaningRules, Trajectory, busiest_window, clean, motion
-from pipeline.lab.simulate.types import TYPES, type_of
+from pipeline.reference.types import TYPES, type_of
 from tests.simulate.field import FRAME
 
 START = 1_600_000_000.0

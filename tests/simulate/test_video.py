@@ -18,8 +18,8 @@ from pipeline.lab.simulate.clutter import SHAPES, PowerLaw, quantiles
 from pipeline.lab.simulate.paths import Truth
 from pipeline.lab.simulate.rain import RainCell, shower
 from pipeline.lab.simulate.scatter import centres
-from pipeline.lab.simulate.types import TYPES
 from pipeline.lab.simulate.video import VideoSimulator
+from pipeline.reference.types import TYPES
 from tests.simulate.field import airport, one_target, radar, uniform
 
 DB = 0.3125

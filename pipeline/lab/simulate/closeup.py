@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from shapely import Polygon, contains_xy, union_all
 from shapely.geometry.base import BaseGeometry
 
-from pipeline.lab.simulate.types import TYPES, TargetType
+from pipeline.reference.types import TYPES, TargetType
 from pipeline.tables import TargetClass, VideoFormat
 
 Floats = NDArray[np.float64]

@@ -11,7 +11,7 @@ from shapely.geometry import Point
 
 from pipeline.airport.model import Airport
 from pipeline.lab.simulate.paths import Movement
-from pipeline.lab.simulate.types import TYPES
+from pipeline.reference.types import TYPES
 
 _TYPES = ("A320", "B738", "E190", "A321")
 

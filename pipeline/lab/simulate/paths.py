@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.lab.simulate.types import NAMES, TYPES
+from pipeline.reference.types import NAMES, TYPES
 from pipeline.tables.schema import Array, Table, column
 
 Floats = NDArray[np.float64]
@@ -27,7 +27,7 @@ class Truth(Table):
     length: Array = column("f4", "m", "along the heading")
     width: Array = column("f4", "m", "across the heading")
     height: Array = column("f4", "m", "of the target's top above its wheels")
-    type: Array = column("u1", "", "index into pipeline.lab.simulate.types.NAMES")
+    type: Array = column("u1", "", "index into pipeline.reference.types.NAMES")
     category: Array = column("u1", "", "TargetClass")
     callsign: Array = column("U8", "", "flight or vehicle identification; empty when it has none", default="")
     address: Array = column("U6", "", "24-bit address; empty when it has none", default="")

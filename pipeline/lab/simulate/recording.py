@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pipeline.airport.frame import LocalFrame
 from pipeline.lab.simulate.paths import Movement
 from pipeline.lab.simulate.traffic import Trajectory, motion
-from pipeline.lab.simulate.types import TYPES, type_of
+from pipeline.reference.types import TYPES, type_of
 
 Floats = NDArray[np.float64]
 

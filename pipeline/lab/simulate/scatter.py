@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.lab.simulate.types import NAMES, TYPES, TargetType
+from pipeline.reference.types import NAMES, TYPES, TargetType
 from pipeline.tables import TargetClass
 
 COLUMNS = 6

@@ -6,9 +6,9 @@ import numpy as np
 
 from pipeline.airport.model import Airport
 from pipeline.lab.simulate.paths import Movement, Paths
-from pipeline.lab.simulate.types import NAMES, TYPES
 from pipeline.lab.simulate.vehicles import lap, service_roads, taxi_runs
 from pipeline.lab.simulate.world import World
+from pipeline.reference.types import NAMES, TYPES
 from pipeline.tables import TargetClass
 
 _SHARE_OF_AIRCRAFT = 0.6

@@ -1,4 +1,4 @@
-"""The types of aircraft and vehicles that the simulator knows, with their dimensions."""
+"""The types of aircraft and vehicles with their dimensions, as simulator and bearing templates need them."""
 
 from __future__ import annotations
 

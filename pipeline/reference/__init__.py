@@ -1,0 +1,1 @@
+"""Reference data: the types of aircraft and vehicles, with their dimensions."""
