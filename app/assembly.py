@@ -13,9 +13,9 @@ from app.settings import NodeSettings, PartSettings, RadarSettings, Settings, Se
 from pipeline import parts
 from pipeline.airport.model import Airport
 from pipeline.airport.surfaces import surface_of_radar
+from pipeline.alert.monitor import AlertMonitor
 from pipeline.chain import RadarChain
 from pipeline.engine import SurfaceEngine
-from pipeline.monitor.alert_monitor import AlertMonitor
 from pipeline.sites import NodeSite, RadarSite
 from pipeline.tables import VideoFormat
 from pipeline.track.tracker import Tracker

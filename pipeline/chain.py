@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipeline.bearing import BearingEstimator
 from pipeline.bearing.of_plots import Expectations, PlotBearings
-from pipeline.detect import Detector
-from pipeline.extract import Extractor
+from pipeline.contracts.bearing import BearingEstimator
+from pipeline.contracts.detect import Detector
+from pipeline.contracts.extract import Extractor
 from pipeline.kernels.scan_convert import plot_images
 from pipeline.sites import RadarSite
 from pipeline.state import StateError

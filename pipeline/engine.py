@@ -36,7 +36,7 @@ class TrackerLike(Protocol):
 
 
 class MonitorLike(Protocol):
-    """What the engine needs of an alert monitor; `pipeline.monitor.alert_monitor.AlertMonitor` is the one there is."""
+    """What the engine needs of an alert monitor; `pipeline.alert.monitor.AlertMonitor` is the one there is."""
 
     @property
     def alerts(self) -> tuple[Alert, ...]:

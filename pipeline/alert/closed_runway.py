@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.alert.conflict import Conflict, RuleSettings, approach_fields, stage_of, track_numbers
-from pipeline.monitor.situation import Situation
+from pipeline.alert.conflict import RuleSettings, approach_fields, stage_of, track_numbers
+from pipeline.contracts.alert import Conflict, Situation
 from pipeline.picture import Stage
 
 CAT004_CLOSED = 30

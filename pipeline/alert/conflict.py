@@ -4,40 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
+from pipeline.contracts.alert import Situation
 from pipeline.picture import Stage, Visibility
-
-if TYPE_CHECKING:
-    from pipeline.monitor.situation import Situation
-
-
-@dataclass(frozen=True)
-class Conflict:
-    """One dangerous constellation, as seen in one situation. Times s, lengths m, (east, north) m.
-
-    tracks: track numbers, the moving one first. certain: no need to see it again before the alert is raised.
-    cat004_type: message type of ASTERIX CAT004. cat011_type: alert type of CAT011 I600 (free; see each rule).
-    """
-
-    rule: str
-    runway: str
-    tracks: tuple[int, ...]
-    stage: Stage
-    text: str
-    certain: bool = False
-    holding_point: str | None = None
-    time_to_threshold: float | None = None
-    distance_to_threshold: float | None = None
-    time_to_conflict: float | None = None
-    separation: float | None = None
-    predicted_separation: float | None = None
-    conflict_position: tuple[float, float] | None = None
-    parameter_set: str = "default"
-    cat004_type: int = 0
-    cat011_type: int = 0
 
 
 @dataclass(frozen=True)

@@ -12,16 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.alert.conflict import (
-    Conflict,
-    RuleSettings,
-    approach_fields,
-    closest_approach,
-    stage_of,
-    track_numbers,
-)
-from pipeline.monitor.holds import Entry
-from pipeline.monitor.situation import Situation
+from pipeline.alert.conflict import RuleSettings, approach_fields, closest_approach, stage_of, track_numbers
+from pipeline.contracts.alert import Conflict, Entry, Situation
 from pipeline.tables import TargetClass
 
 CAT004_STOP_BAR, CAT004_CROSSING = 16, 13

@@ -7,15 +7,8 @@ from itertools import combinations
 
 import numpy as np
 
-from pipeline.alert.conflict import (
-    Conflict,
-    RuleSettings,
-    approach_fields,
-    closest_approach,
-    stage_of,
-    track_numbers,
-)
-from pipeline.monitor.situation import Situation
+from pipeline.alert.conflict import RuleSettings, approach_fields, closest_approach, stage_of, track_numbers
+from pipeline.contracts.alert import Conflict, Situation
 
 CAT004_OPPOSITE = 11
 CAT011_TYPE = 3

@@ -8,15 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.alert.conflict import (
-    Conflict,
-    RuleSettings,
-    approach_fields,
-    closest_approach,
-    stage_of,
-    track_numbers,
-)
-from pipeline.monitor.situation import Situation
+from pipeline.alert.conflict import RuleSettings, approach_fields, closest_approach, stage_of, track_numbers
+from pipeline.contracts.alert import Conflict, Situation
 
 CAT004_ARRIVAL, CAT004_DEPARTURE = 9, 12
 CAT011_TYPE = 1

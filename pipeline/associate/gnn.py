@@ -9,8 +9,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pipeline.contracts.associate import Assignment, Expected, Measured
 from pipeline.kernels.assignment import assign_sparse
-from pipeline.track.contracts import Array, Assignment, Expected, Floats, Measured
+from pipeline.tables.arrays import Array, Floats
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.bearing import NO_BEARING, Bearing, Expected, TargetView
 from pipeline.bearing.sense import pointed
+from pipeline.contracts.bearing import NO_BEARING, Bearing, Expected, TargetView
 from pipeline.kernels.echo import measured
 from pipeline.kernels.hough import hough, peaks
 from pipeline.kernels.scan_convert import grid_of, scan_converted

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipeline.bearing import NO_BEARING, Bearing, Expected, TargetView
 from pipeline.bearing.hough import Hough
 from pipeline.bearing.sense import pointed
 from pipeline.bearing.type_bank import ANGLES, TypeBank, check, nearest_template
+from pipeline.contracts.bearing import NO_BEARING, Bearing, Expected, TargetView
 from pipeline.kernels.echo import measured
 from pipeline.kernels.scan_convert import grid_of
 from pipeline.sites import RadarSite

@@ -19,8 +19,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipeline.bearing import NO_BEARING, Bearing, Expected, TargetView
 from pipeline.bearing.sense import pointed
+from pipeline.contracts.bearing import NO_BEARING, Bearing, Expected, TargetView
 from pipeline.kernels.correlate import belief, decibels, fit
 from pipeline.kernels.echo import measured
 from pipeline.kernels.planform import Planform, Templates, templates

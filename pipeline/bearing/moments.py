@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from pipeline.bearing import NO_BEARING, Bearing, Expected, TargetView
 from pipeline.bearing.sense import pointed
+from pipeline.contracts.bearing import NO_BEARING, Bearing, Expected, TargetView
 from pipeline.kernels.echo import measured
 from pipeline.kernels.scan_convert import grid_of
 from pipeline.sites import RadarSite

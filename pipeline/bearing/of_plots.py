@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipeline.bearing import BearingEstimator, Expected, TargetView
+from pipeline.contracts.bearing import BearingEstimator, Expected, TargetView
 from pipeline.sites import RadarSite
 from pipeline.tables import Plots
 

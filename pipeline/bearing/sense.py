@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from pipeline.bearing import NO_BEARING, Bearing, Expected
+from pipeline.contracts.bearing import NO_BEARING, Bearing, Expected
 
 NOSE_SD = math.radians(40)
 """An expected heading less sure than this does not tell the nose from the tail."""

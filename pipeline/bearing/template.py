@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.bearing import NO_BEARING, Bearing, Expected, TargetView
 from pipeline.bearing.sense import pointed
 from pipeline.bearing.type_bank import AIRCRAFT, ANGLES, TypeBank, check
+from pipeline.contracts.bearing import NO_BEARING, Bearing, Expected, TargetView
 from pipeline.kernels.correlate import belief
 from pipeline.kernels.echo import measured
 from pipeline.kernels.scan_convert import grid_of

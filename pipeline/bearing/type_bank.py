@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.bearing import TargetView
+from pipeline.contracts.bearing import TargetView
 from pipeline.kernels.correlate import explained
 from pipeline.kernels.echo import Echo
 from pipeline.kernels.planform import Planform, Templates, templates

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.tables import TargetClass
-from pipeline.track.contracts import Array
+from pipeline.tables.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.lifecycle.fading import Fading
 from pipeline.tables import TrackPhase
-from pipeline.track.contracts import Array, Floats
+from pipeline.tables.arrays import Array, Floats
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,9 +9,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from pipeline.contracts.associate import AssociatePart
+from pipeline.contracts.classify import ClassifyPart
+from pipeline.contracts.filter import FilterPart
+from pipeline.contracts.lifecycle import LifecyclePart
 from pipeline.sites import NodeSite, RadarSite
 from pipeline.tables import Plots, Source, TrackPhase
-from pipeline.track.contracts import Array, AssociatePart, ClassifyPart, FilterPart, Floats, LifecyclePart
+from pipeline.tables.arrays import Array, Floats
 from pipeline.track.false_plots import FalsePlots
 from pipeline.track.look import RadarClock
 from pipeline.track.shape import ShapeRule, extents

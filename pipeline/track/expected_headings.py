@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.tables import TrackPhase, Tracks
-from pipeline.track.contracts import Floats
+from pipeline.tables.arrays import Floats
 
 MOVING = 2.0
 """m/s: above it a target moves the way it points."""

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from pipeline.sites import RadarSite
-from pipeline.track.contracts import Array, Floats
+from pipeline.tables.arrays import Array, Floats
 
 REACH = 0.5
 """A false plot strays by about this many cells of the grid, so it is shared among four."""

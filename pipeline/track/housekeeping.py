@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from pipeline.contracts.associate import Expected
 from pipeline.tables import TargetCategory, TargetClass, TrackPhase
-from pipeline.track.contracts import Array, Expected, Floats
+from pipeline.tables.arrays import Array, Floats
 from pipeline.track.core import Core, end, judge, strip_identity
 from pipeline.track.parts import absorb, join_parts
 from pipeline.track.radar_update import owners

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from pipeline.sites import RadarSite
-from pipeline.track.contracts import Array, Floats
+from pipeline.tables.arrays import Array, Floats
 
 TWO_PI = 2 * math.pi
 

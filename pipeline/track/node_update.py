@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pipeline.tables import NodeEventKind, NodeEvents, Source, TrackPhase
-from pipeline.track.contracts import Array, Floats
+from pipeline.tables.arrays import Array, Floats
 from pipeline.track.core import Core, judge, start, take
 
 LEAST_SPEED = 0.5

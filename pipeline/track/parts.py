@@ -9,7 +9,7 @@ from numba import njit
 
 from pipeline.airport.model import SurfaceKind
 from pipeline.tables import TargetClass, TrackPhase
-from pipeline.track.contracts import Array, Floats
+from pipeline.tables.arrays import Array, Floats
 from pipeline.track.core import Core, end
 
 BODY = 21.0

@@ -8,8 +8,9 @@ import numpy as np
 from numba import njit
 
 from pipeline.airport.model import SurfaceKind
+from pipeline.contracts.associate import Expected, Measured
 from pipeline.tables import Plots, SectorPlots, Source, TrackPhase
-from pipeline.track.contracts import Array, Expected, Floats, Measured
+from pipeline.tables.arrays import Array, Floats
 from pipeline.track.core import Core, start, take
 from pipeline.track.look import Looks, RadarClock, plan_looks
 from pipeline.track.shape import oriented_noise, plot_extents, reshape

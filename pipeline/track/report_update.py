@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.contracts.associate import Assignment, Expected, Measured
 from pipeline.tables import Source, TargetCategory, TargetReports, TrackPhase
-from pipeline.track.contracts import Array, Assignment, Expected, Floats, Measured
+from pipeline.tables.arrays import Array, Floats
 from pipeline.track.core import Core, judge, start, strip_identity, take
 
 AIRCRAFT_CENTRE_SD = 0.1

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from pipeline.tables import Plots
-from pipeline.track.contracts import Array, Floats
+from pipeline.tables.arrays import Array, Floats
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.track.contracts import Array
+from pipeline.tables.arrays import Array
 
 NEVER = -np.inf
 """The time of what has not happened."""

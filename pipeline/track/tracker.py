@@ -10,9 +10,13 @@ from typing import Any
 import numpy as np
 
 from pipeline.airport.model import Airport, SurfaceKind
+from pipeline.contracts.associate import AssociatePart
+from pipeline.contracts.classify import ClassifyPart
+from pipeline.contracts.filter import FilterPart
+from pipeline.contracts.lifecycle import LifecyclePart
 from pipeline.sites import NodeSite, RadarSite
 from pipeline.tables import NodeEvents, Plots, SectorPlots, TargetReports, TrackPhase, Tracks
-from pipeline.track.contracts import Array, AssociatePart, ClassifyPart, FilterPart, LifecyclePart
+from pipeline.tables.arrays import Array
 from pipeline.track.core import SOURCE_TIMES, Core, TrackerSettings, ZoneLookup, judge, make_core
 from pipeline.track.housekeeping import keep_house
 from pipeline.track.node_update import take_node_events
@@ -28,7 +32,7 @@ class Tracker:
     """One central table of tracks; not safe for several threads. Bad input is dropped and counted, never raised.
 
     airport, radars, nodes: where things are; the `radar` and `node` of tables are indices into these.
-    filter, associate, lifecycle, classify: parts (see `pipeline.track.contracts`). capacity: tracks at most,
+    filter, associate, lifecycle, classify: parts (see `pipeline.contracts`). capacity: tracks at most,
     tentative ones included, up to 4095. zones: where on the airport a point lies; made from the airport when not given.
     counters: what was dropped or done, by reason; numbers only grow.
     Raises ValueError for a capacity out of bounds.

@@ -14,7 +14,7 @@ from shapely.geometry import LineString, Point, box
 from pipeline.airport.frame import LocalFrame
 from pipeline.airport.model import Airport, HoldingPosition, Runway, RunwayEnd, TaxiGraph
 from pipeline.alert import closed_runway, hold_entry, opposite_direction, runway_occupied
-from pipeline.monitor.alert_monitor import AlertMonitor
+from pipeline.alert.monitor import AlertMonitor
 from pipeline.picture import Alert, AlertChange, RunwayState
 from pipeline.tables import NodeEvents, Source, TargetClass, TrackPhase, Tracks
 

@@ -11,10 +11,9 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from pipeline.alert import Conflict
-from pipeline.monitor.alert_monitor import AlertMonitor
-from pipeline.monitor.life import LifeSettings
-from pipeline.monitor.situation import Situation
+from pipeline.alert.life import LifeSettings
+from pipeline.alert.monitor import AlertMonitor
+from pipeline.contracts.alert import Conflict, Situation
 from pipeline.picture import AlertChange, RunwayState
 from pipeline.tables import NodeEvents, TargetClass, Tracks
 from tests.alerts.scene import arrival, monitor, parked, play, small_airport, tracks_at

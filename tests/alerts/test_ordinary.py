@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pipeline.monitor.alert_monitor import AlertMonitor
+from pipeline.alert.monitor import AlertMonitor
 from pipeline.picture import RunwayState
 from pipeline.tables import TargetClass
 from tests.alerts.scene import Mover, arrival, departure, monitor, parked, play

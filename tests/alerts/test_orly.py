@@ -9,8 +9,8 @@ import pytest
 
 from app.airports import load_airport
 from pipeline.airport.model import Airport
-from pipeline.monitor.alert_monitor import AlertMonitor
-from pipeline.monitor.geometry import HoldFrames, RunwayFrames
+from pipeline.airport.runway_frames import HoldFrames, RunwayFrames
+from pipeline.alert.monitor import AlertMonitor
 from pipeline.picture import RunwayState
 from pipeline.tables import TargetClass
 from tests.alerts.scene import RULES, Mover, play

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from pipeline import parts
-from pipeline.alert import Conflict
-from pipeline.monitor.geometry import HoldFrames, RunwayFrames
-from pipeline.monitor.situation import Situation, SituationSettings, observe
+from pipeline.airport.runway_frames import HoldFrames, RunwayFrames
+from pipeline.contracts.alert import Conflict, Situation, SituationSettings
 from pipeline.picture import RunwayState
+from pipeline.situation.observe import observe
 from pipeline.tables import TargetClass, Tracks
 from tests.alerts.scene import arrival, departure, parked, small_airport, tracks_at
 

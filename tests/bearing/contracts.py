@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.bearing import Bearing, BearingEstimator, Expected, TargetView
+from pipeline.contracts.bearing import Bearing, BearingEstimator, Expected, TargetView
 from tests.bearing.scene import SITE, VIDEO, axis_error, site, view
 
 QUARTER = VIDEO.azimuths // 4

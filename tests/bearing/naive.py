@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.bearing import TargetView
+from pipeline.contracts.bearing import TargetView
 from pipeline.sites import RadarSite
 
 

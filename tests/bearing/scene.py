@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.bearing import TargetView
+from pipeline.contracts.bearing import TargetView
 from pipeline.lab.simulate.closeup import CLOSEUP_TYPES, Posed, closeup
 from pipeline.sites import RadarSite
 from pipeline.tables import VideoFormat

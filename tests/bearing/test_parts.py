@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 from skimage.transform import hough_line
 
-from pipeline.bearing import BearingEstimator, Expected
 from pipeline.bearing.hough import Hough
 from pipeline.bearing.hough_template import HoughTemplate
 from pipeline.bearing.ml import MaximumLikelihood
 from pipeline.bearing.moments import Moments
 from pipeline.bearing.template import Template
+from pipeline.contracts.bearing import BearingEstimator, Expected
 from pipeline.kernels.echo import measured
 from pipeline.kernels.hough import hough, peaks
 from pipeline.kernels.planform import Planform, templates

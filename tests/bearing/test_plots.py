@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.bearing import Bearing, Expected, TargetView
 from pipeline.bearing.ml import MaximumLikelihood
 from pipeline.bearing.moments import Moments
 from pipeline.bearing.of_plots import MOST_A_PART, Expectations, PlotBearings
 from pipeline.chain import RadarChain
+from pipeline.contracts.bearing import Bearing, Expected, TargetView
 from pipeline.detect.hybrid import Hybrid
 from pipeline.extract.manhattan import Manhattan
 from pipeline.lab.simulate.closeup import CLOSEUP_TYPES, Posed, closeup

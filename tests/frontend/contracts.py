@@ -10,9 +10,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from pipeline.detect import Detector
+from pipeline.contracts.detect import Detector
+from pipeline.contracts.extract import Extractor
 from pipeline.detect.calibration import false_alarm_probability
-from pipeline.extract import Extractor
 from pipeline.state import StateError
 from pipeline.tables import Plots, Sweeps, VideoFormat
 from tests.frontend.scenes import SMALL, cut, packed, rayleigh, site, strip

@@ -12,7 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.stats import binom
 
-from pipeline.detect import Detector
+from pipeline.contracts.detect import Detector
 from pipeline.detect.adaptive import Adaptive
 from pipeline.kernels.tiles import learn_tiles, tile_bits, tile_bits_lowered, tile_limits
 from pipeline.parts import build

@@ -9,7 +9,7 @@ import pytest
 from scipy.ndimage import uniform_filter1d
 from scipy.stats import binom
 
-from pipeline.detect import Detector
+from pipeline.contracts.detect import Detector
 from pipeline.detect.ca import CellAveraging
 from pipeline.detect.calibration import mean_offsets_db, power_mean_offsets_db
 from pipeline.parts import PartError, build

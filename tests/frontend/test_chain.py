@@ -11,11 +11,11 @@ import pytest
 
 from pipeline import parts
 from pipeline.chain import RadarChain
-from pipeline.detect import Detector
+from pipeline.contracts.detect import Detector
+from pipeline.contracts.extract import Extractor
 from pipeline.detect.adaptive import Adaptive
 from pipeline.detect.clutter_map import ClutterMap
 from pipeline.detect.hybrid import Hybrid
-from pipeline.extract import Extractor
 from pipeline.extract.hysteresis import Hysteresis
 from pipeline.extract.manhattan import Manhattan
 from pipeline.state import StateError

@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import binom
 
-from pipeline.detect import Detector
+from pipeline.contracts.detect import Detector
 from pipeline.detect.clutter_map import ClutterMap
 from pipeline.parts import PartError, build
 from pipeline.state import StateError

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from pipeline.detect import Detector
+from pipeline.contracts.detect import Detector
 from pipeline.detect.calibration import false_alarm_probability, threshold_offset_db
 from pipeline.detect.hybrid import Hybrid, HybridState
 from pipeline.detect.macro_cells import FEWEST, MacroCells, MapCells, map_labels

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.chain import RadarChain
-from pipeline.extract import Extractor
+from pipeline.contracts.extract import Extractor
 from pipeline.extract.hysteresis import Hysteresis
 from pipeline.kernels.growth import GrowthState
 from pipeline.parts import PartError, build

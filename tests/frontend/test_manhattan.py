@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.extract import Extractor
+from pipeline.contracts.extract import Extractor
 from pipeline.extract.manhattan import Manhattan
 from pipeline.parts import PartError, build
 from pipeline.state import StateError

@@ -9,7 +9,7 @@ import pytest
 from scipy.ndimage import rank_filter
 from scipy.stats import binom
 
-from pipeline.detect import Detector
+from pipeline.contracts.detect import Detector
 from pipeline.detect.calibration import order_offset_steps
 from pipeline.detect.os import GOLDEN, OrderedStatistic
 from pipeline.parts import PartError, build

@@ -7,8 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipeline.contracts.associate import AssociatePart, Expected, Measured
+from pipeline.contracts.classify import ClassifyPart
+from pipeline.contracts.filter import FilterPart
+from pipeline.contracts.lifecycle import LifecyclePart
 from pipeline.tables import TargetClass, TrackPhase
-from pipeline.track.contracts import AssociatePart, ClassifyPart, Expected, FilterPart, LifecyclePart, Measured
 
 
 def spread(rng: np.random.Generator, n: int, dim: int) -> np.ndarray[Any, Any]:

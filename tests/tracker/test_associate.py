@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
 from pipeline.associate.gnn import GlobalNearestNeighbour
+from pipeline.contracts.associate import Expected, Measured
 from pipeline.kernels.assignment import assign_sparse
-from pipeline.track.contracts import Expected, Measured
 from tests.tracker.contracts import AssociateContract, expected, measured
 
 PART = GlobalNearestNeighbour()

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, label
 
-from pipeline.bearing import Expected, TargetView
+from pipeline.contracts.bearing import Expected, TargetView
 from pipeline.kernels.scan_convert import grid_of, scan_converted
 from pipeline.lab.evaluate import Figure, Line, Picture, Row, Trial
 from pipeline.lab.evaluate.statistics import mean_interval, rms_interval, wilson

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.detect import Detector
+from pipeline.contracts.detect import Detector
 from pipeline.lab.evaluate.cfar_law import Law
 from pipeline.lab.evaluate.ground import Scene
 from pipeline.parts import available, build

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import parts
+from pipeline.contracts.extract import Extractor
 from pipeline.detect.calibration import threshold_offset_db
-from pipeline.extract import Extractor
 from pipeline.lab.evaluate import Figure, Line, Picture, Row, Trial
 from pipeline.lab.evaluate.statistics import mean_interval, rms_interval, wilson
 from pipeline.lab.simulate.closeup import CLOSEUP_TYPES, Closeup, Posed, closeup

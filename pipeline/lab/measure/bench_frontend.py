@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.chain import RadarChain
-from pipeline.detect import Detector
-from pipeline.extract import Extractor
+from pipeline.contracts.detect import Detector
+from pipeline.contracts.extract import Extractor
 from pipeline.lab.measure.frontend_peers import peers as peer_rows
 from pipeline.lab.measure.frontend_workload import (
     FRAMES,

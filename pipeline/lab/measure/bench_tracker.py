@@ -12,11 +12,12 @@ from pipeline.airport.frame import LocalFrame
 from pipeline.airport.model import Airport, SurfaceKind, TaxiGraph
 from pipeline.associate.gnn import GlobalNearestNeighbour
 from pipeline.classify.extent_speed import ExtentSpeed
+from pipeline.contracts.associate import Expected, Measured
 from pipeline.filter.kalman import Kalman
 from pipeline.lifecycle.score import Score
 from pipeline.sites import RadarSite
 from pipeline.tables import Plots, SectorPlots, VideoFormat
-from pipeline.track.contracts import Array, Expected, Floats, Measured
+from pipeline.tables.arrays import Array, Floats
 from pipeline.track.tracker import Tracker
 
 EPOCH = 1.7e9

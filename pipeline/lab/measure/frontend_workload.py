@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.airport.model import SurfaceKind
-from pipeline.detect import Detector
+from pipeline.contracts.detect import Detector
 from pipeline.tables import Detections, Sweeps, VideoFormat
 
 VIDEO = VideoFormat()

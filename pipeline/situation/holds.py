@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.monitor.geometry import HoldFrames
+from pipeline.airport.runway_frames import HoldFrames
+from pipeline.contracts.alert import Entry
 
 Array = NDArray[Any]
 
@@ -31,16 +32,6 @@ class HoldSettings:
     node_wait_s: float = 3.0
     reach_s: float = 30.0
     soon_s: float = 3.0
-
-
-@dataclass
-class Entry:
-    """A passed holding position. since: s on the monitor's clock. node: a node felt it. reached: it is in the area."""
-
-    hold: int
-    since: float
-    node: bool = False
-    reached: bool = False
 
 
 @dataclass

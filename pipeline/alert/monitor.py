@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from pipeline.airport.model import Airport
-from pipeline.alert.conflict import Conflict
-from pipeline.monitor.geometry import HoldFrames, RunwayFrames
-from pipeline.monitor.holds import Entry, HoldMemory, HoldSettings, watch_holds
-from pipeline.monitor.life import Case, LifeSettings, write_alert
-from pipeline.monitor.situation import Situation, SituationSettings, observe
+from pipeline.airport.runway_frames import HoldFrames, RunwayFrames
+from pipeline.alert.life import Case, LifeSettings, write_alert
+from pipeline.contracts.alert import Conflict, Entry, Situation, SituationSettings
 from pipeline.picture import Alert, AlertChange, RunwayState, Visibility
 from pipeline.sites import NodeSite
+from pipeline.situation.holds import HoldMemory, HoldSettings, watch_holds
+from pipeline.situation.observe import observe
 from pipeline.tables import NodeEvents, Tracks
 
 Rule = Callable[[Situation], tuple[Conflict, ...]]

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pipeline.alert.conflict import Conflict
-from pipeline.monitor.situation import Situation
+from pipeline.contracts.alert import Conflict, Situation
 from pipeline.picture import Alert, AlertTarget, Stage
 from pipeline.tables import Source, TargetClass
 
