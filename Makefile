@@ -32,7 +32,7 @@ help: ## say what there is
 run: install ## run the demonstration at http://127.0.0.1:8000 (another port: AIRSIDE_PORT=8080 make run)
 	@exec $(BIN)/airside $(MODE)
 
-test: install-dev ## run all tests (some of them: TESTS=tests/alerts make test)
+test: install-dev ## run all tests (some of them: TESTS=tests/pipeline/alert make test)
 	$(BIN)/python -m pytest $(TESTS)
 
 install: $(VENV)/.installed ## make .venv with what running needs, from requirements.lock

@@ -5,7 +5,7 @@ An estimator is a frozen dataclass of settings, named by its file and given as `
 * `start(site)` makes what it needs for one radar (template banks); it is read only afterwards;
 * calling it with a view of one target, what is expected of its heading, and that gives one estimate.
 
-Rules, tested by `tests.bearing.contracts.BearingContract`:
+Rules, tested by `tests.pipeline.contracts.bearing.BearingContract`:
 
 * Nothing is remembered between targets; the same view gives the same estimate.
 * A view too small, empty, saturated or on any grid gives an estimate without a bearing (nan), never an error.

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.display.conftest import Screen, browser
+from tests.static.conftest import Screen, browser
 from tests.whole.conftest import Airside, launch
 from tests.whole.test_demo import eventually
 

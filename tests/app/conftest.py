@@ -1,0 +1,24 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from tests.support.running import Server, running, until
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A server with a store and one picture; shared by the tests of a module that only look."""
+    with running(Path(tmp_path_factory.mktemp("store"))) as made:
+        made.service.step()
+        until(lambda: made.hub.picture is not None, "the first picture is numbered")
+        yield made
+
+
+@pytest.fixture(scope="module")
+def http(server: Server) -> Iterator[httpx.Client]:
+    with httpx.Client(base_url=server.url, timeout=20.0) as client:
+        yield client

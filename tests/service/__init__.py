@@ -1,1 +1,0 @@
-"""Tests of storage, REST, live feed and metrics."""

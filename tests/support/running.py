@@ -1,0 +1,82 @@
+"""A real server on a free port, in a thread of the test."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import uvicorn
+
+from app.api.application import create_app
+from app.live.hub import Hub
+from app.settings import FeedSettings, LimitsSettings, RadarSettings, Settings
+from app.store.store import Store
+from tests.support.fake_service import FakeService
+
+
+def settings_for_tests(**values: Any) -> Settings:
+    radar = RadarSettings(id="smr-1", latitude=48.72, longitude=2.38)
+    return Settings(**{"mode": "demo", "radars": (radar,), **values})
+
+
+@dataclass
+class Server:
+    service: FakeService
+    hub: Hub
+    store: Store | None
+    port: int
+    app: Any
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.port}"
+
+    @property
+    def live(self) -> str:
+        return f"ws://127.0.0.1:{self.port}/api/v1/live"
+
+
+@contextlib.contextmanager
+def running(
+    folder: Path | None = None, *, feed: FeedSettings | None = None, limits: LimitsSettings | None = None, **fake: Any
+) -> Iterator[Server]:
+    """Serve a fake service that stands still until the test calls `service.step()`."""
+    settings = settings_for_tests(feed=feed or FeedSettings(), limits=limits or LimitsSettings())
+    service = FakeService(settings, **fake)
+    hub = Hub(service, settings)
+    service.listen(hub.publish)
+    store = None
+    if folder is not None:
+        store = Store(f"sqlite:///{folder / 'airside.sqlite3'}", settings, service.airport)
+        store.start()
+        service.listen(store.record)
+    app = create_app(service, hub=hub, store=store)
+    config = uvicorn.Config(
+        app, host="127.0.0.1", port=0, log_config=None, ws="websockets-sansio", ws_per_message_deflate=False,
+        timeout_graceful_shutdown=2, access_log=False,
+    )  # fmt: skip
+    server = uvicorn.Server(config)
+    thread = threading.Thread(target=server.run, daemon=True)
+    thread.start()
+    try:
+        until(lambda: server.started, "the server starts")
+        yield Server(service, hub, store, server.servers[0].sockets[0].getsockname()[1], app)
+    finally:
+        server.should_exit = True
+        thread.join(15.0)
+        if store is not None:
+            store.stop()
+    assert not thread.is_alive(), "the server did not end"
+
+
+def until(condition: Any, what: str, timeout: float = 15.0) -> None:
+    """Wait for a condition; fail with words when it does not come."""
+    end = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < end, f"waited in vain until {what}"
+        time.sleep(0.005)
