@@ -20,6 +20,7 @@ from app.runtime.surface_worker import SurfaceWorker
 from app.settings import Settings
 from pipeline.airport.model import Airport
 from pipeline.airport.surfaces import surface_of_radar
+from pipeline.inputs import Acknowledge, Command, SetRunway
 from pipeline.picture import Alert, AlertChange, Picture, RunwayState, SensorState, Visibility
 from pipeline.sites import RadarSite
 from pipeline.tables import NodeEvents, TargetReports
@@ -84,7 +85,7 @@ class SurfaceService:
             chain.warm()
             if resume:
                 self._keeper.take_up(chain)
-            worker = RadarWorker(site, chain, self.settings.limits.blocks_queued, self._surface.inbox.offer)
+            worker = RadarWorker(site, chain, self.settings.limits.blocks_queued, self._surface.offer)
             self._switches[site.id] = FrontEndSwitch(worker, index, ground, self._compiler)
             self._workers[site.id] = worker
             if radar.udp is not None:
@@ -161,34 +162,24 @@ class SurfaceService:
 
     def acknowledge(self, alert: int, by: str) -> Alert:
         """Acknowledge a live alert."""
-        surface = self._running
-
-        def work(engine: Any) -> AlertChange:
-            change: AlertChange = engine.monitor.acknowledge(alert, by, engine.time)
-            surface.record_change(change)
-            return change
-
-        try:
-            change: AlertChange = surface.ask(work)
-        except KeyError as error:
-            raise UnknownId(alert) from error
-        except ValueError as error:
-            raise Refused(str(error)) from error
-        return change.alert
+        acknowledged: Alert = self._carried_out(Acknowledge(alert, by), alert)
+        return acknowledged
 
     def set_runway(
         self, runway: str, *, open: bool | None, in_use: str | None, visibility: Visibility | None
     ) -> RunwayState:
         """Set how a runway is used."""
+        state: RunwayState = self._carried_out(SetRunway(runway, open, in_use, visibility), runway)
+        return state
+
+    def _carried_out(self, command: Command, id: int | str) -> Any:
+        """The engine's answer to a command about `id`. Raises UnknownId, Refused."""
         try:
-            state: RunwayState = self._running.ask(
-                lambda engine: engine.monitor.set_runway(runway, open=open, in_use=in_use, visibility=visibility)
-            )
+            return self._running.ask(command)
         except KeyError as error:
-            raise UnknownId(runway) from error
+            raise UnknownId(id) from error
         except ValueError as error:
             raise Refused(str(error)) from error
-        return state
 
     def submit_sweeps(self, radar: str, body: bytes) -> dict[str, int]:
         """Take sweeps in octet form, as if they had come by datagram."""
@@ -229,7 +220,7 @@ class SurfaceService:
     def _submit(self, kind: str, table: NodeEvents | TargetReports) -> None:
         if not len(table):
             return
-        if not self._running.inbox.offer(table):
+        if not self._running.offer(table):
             raise Refused(f"the queue for {kind} is full")
         _, _, total = self._heard.get(kind, (0.0, 0.0, 0))
         self._heard[kind] = (time.monotonic(), float(table.time.max()), total + len(table))
@@ -278,7 +269,7 @@ class SurfaceService:
             return SensorState("surface", "tracker", "waiting", None)
         held_now, held_ever = surface.engine.monitor.held_back
         counters = {
-            **surface.engine.tracker.counters,
+            **surface.engine.counters,
             "alerts_held_back": held_ever,
             "queue_refused": surface.inbox.refused,
             "failures": surface.failures,

@@ -14,8 +14,8 @@ LEAST_SPEED = 0.5
 """m/s, below which the sense of a motion along the lane is not believed."""
 
 
-def take_node_events(core: Core, events: NodeEvents) -> None:
-    """Each event pulls and confirms the track that it fits best, or starts one."""
+def take_node_events(core: Core, events: NodeEvents) -> NodeEvents:
+    """Each event pulls and confirms the track that it fits best, or starts one. Gives those that were taken."""
     known = (events.node >= 0) & (events.node < len(core.nodes))
     core.count("node_unknown", int((~known).sum()))
     events = events[known]
@@ -24,6 +24,7 @@ def take_node_events(core: Core, events: NodeEvents) -> None:
         _take_one(core, events, int(event))
         core.time = max(core.time, float(events.time[event]))
     judge(core)
+    return events
 
 
 def _take_one(core: Core, events: NodeEvents, event: int) -> None:

@@ -24,10 +24,13 @@ SETTLED = 3
 """Extents seen before a track's own extent may absorb plots."""
 
 
-def take_sector(core: Core, sector: SectorPlots) -> None:
-    """Work on what one radar closed: tracks whose whole gate is closed take a plot or miss; the rest starts tracks."""
+def take_sector(core: Core, sector: SectorPlots) -> bool:
+    """Work on what one radar closed: tracks whose whole gate is closed take a plot or miss; the rest starts tracks.
+
+    False, counted by reason, when the sector cannot be taken.
+    """
     if not _acceptable(core, sector):
-        return
+        return False
     site, clock = core.radars[sector.radar], core.clocks[sector.radar]
     clock.heard(sector.closed_to, sector.time, site.video.azimuths, site.video.period_s)
     core.false_plots[sector.radar].turn(sector.closed_to, site.video.azimuths)
@@ -45,6 +48,7 @@ def take_sector(core: Core, sector: SectorPlots) -> None:
         plots, rows = plots[~stale], rows[~stale]
     wait = _decide(core, sector, plots, rows)
     core.waiting[sector.radar] = plots[wait] if wait.any() else NO_PLOTS
+    return True
 
 
 def _acceptable(core: Core, sector: SectorPlots) -> bool:

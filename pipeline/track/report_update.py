@@ -13,14 +13,15 @@ AIRCRAFT_CENTRE_SD = 0.1
 """The antenna is not the centre of the echo: standard deviation in parts of the extent."""
 
 
-def take_target_reports(core: Core, reports: TargetReports) -> None:
-    """Take reports in order of time; those of one address one after the other."""
+def take_target_reports(core: Core, reports: TargetReports) -> int:
+    """Take reports in order of time; those of one address one after the other. How many were in time and in reach."""
     reports = _usable(core, reports)
     reports = reports[np.argsort(reports.time, kind="stable")]
     turn = _occurrence(reports.address)
     for number in range(int(turn.max()) + 1 if len(turn) else 0):
         _take_round(core, reports[turn == number])
     judge(core)
+    return len(reports)
 
 
 def _usable(core: Core, reports: TargetReports) -> TargetReports:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -147,15 +148,18 @@ class TrackTable:
         self.n, self.last_uid = n, int(saved["last_uid"])
 
 
+@dataclass(slots=True, eq=False)
 class TrackNumbers:
-    """Numbers 1 .. 4095 given in turn, so that the longest unused comes next; those in `rest` s stay unused."""
+    """Numbers 1 .. 4095 given in turn, so that the longest unused comes next; those in `rest` s stay unused.
 
-    LAST = 4095
+    free_at: (4096,) UTC s from which each number may be given again; infinite while it is borne.
+    """
 
-    def __init__(self, rest: float = 120.0) -> None:
-        self.rest = rest
-        self.next = 1
-        self.free_at = np.full(self.LAST + 1, NEVER)
+    LAST: ClassVar[int] = 4095
+
+    rest: float = 120.0
+    next: int = 1
+    free_at: Array = field(default_factory=lambda: np.full(4096, NEVER))
 
     def take(self, time: float) -> int:
         """The next free number, 0 when none is free."""
