@@ -66,6 +66,37 @@ class FrontEnd:
     cut: dict[str, int]
 
 
+@dataclass(frozen=True, slots=True)
+class ReplayState:
+    """Where the replay of a journal stands. begin, end, time: UTC s of the recording. speed: times the recorded pace.
+
+    source: name of the journal. gaps: times at which the recording has a hole or the service was started anew.
+    """
+
+    source: str
+    begin: float
+    end: float
+    time: float
+    playing: bool
+    speed: float
+    gaps: tuple[float, ...] = ()
+
+
+class ReplayControl(Protocol):
+    """Steers the replay of a journal. All methods may be called from any thread."""
+
+    def state(self) -> ReplayState:
+        """Where it stands."""
+
+    def steer(
+        self, *, playing: bool | None = None, speed: float | None = None, time: float | None = None
+    ) -> ReplayState:
+        """Play or pause, at another pace, from another time (UTC s of the recording); None leaves as it is.
+
+        Raises Refused for a time outside the recording and for a speed that is not in 0.1 .. 64.
+        """
+
+
 PictureListener = Callable[[Picture, tuple[AlertChange, ...]], None]
 """Called in the surface thread for every new picture; must return at once and must not raise."""
 
@@ -78,6 +109,8 @@ class Service(Protocol):
     airport_geojson: dict[str, Any]
     radars: tuple[RadarSite, ...]
     nodes: tuple[NodeSite, ...]
+    replay: ReplayControl | None
+    """How to steer what is shown; None for a service that shows what happens now."""
 
     def readiness(self) -> Readiness:
         """Which of the start-up checks (database, warm-up, picture) are passed."""

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from app.assembly import FRONT_END, build_parts, chain_of, check_parts, node_site, radar_site, surface_engine
-from app.contract import FrontEnd, PictureListener, Readiness, Refused, UnknownId, Video
+from app.contract import FrontEnd, PictureListener, Readiness, Refused, ReplayControl, UnknownId, Video
 from app.ingest.octets import OctetIntake
 from app.ingest.udp import VideoReceiver
 from app.runtime.compile_apart import CompilerApart
@@ -45,6 +45,7 @@ class SurfaceService:
         self.airport_geojson = airport_geojson
         self.radars = tuple(radar_site(one, airport) for one in settings.radars)
         self.nodes = tuple(node_site(one, airport) for one in settings.nodes)
+        self.replay: ReplayControl | None = None
         self.checks = {"database": False, "warm": False, "picture": False}
         self.extra_counters: dict[str, Callable[[], dict[str, int]]] = {}
         self.extra_sensors: list[Callable[[], SensorState]] = []

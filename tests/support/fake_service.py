@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from app.assembly import FRONT_END, build_parts, chain_of
-from app.contract import FrontEnd, PictureListener, Readiness, Refused, UnknownId, Video
+from app.contract import FrontEnd, PictureListener, Readiness, Refused, ReplayControl, UnknownId, Video
 from app.runtime.front_end import FrontEndSwitch
 from app.runtime.radar_worker import RadarWorker, Turn
 from app.settings import RadarSettings, Settings
@@ -105,6 +105,7 @@ class FakeService:
         self._switches = {site.id: parts_on(site, index) for index, site in enumerate(self.radars)}
         self.cut: dict[str, str] = {}
         self.nodes = (NodeSite("node-1", -1450.0, -560.0, 2.6, hold="hold-w1", runway="06/24", simulated=True),)
+        self.replay: ReplayControl | None = None
         self.rate_hz = rate_hz
         self.node_events: list[NodeEvents] = []
         self.target_reports: list[TargetReports] = []
