@@ -1,4 +1,4 @@
-"""A surface engine over a small airport with made-up sensors, and the envelopes that a minute of traffic sends to it."""
+"""A surface engine over a small airport with made-up sensors, and the envelopes that traffic sends to it."""
 
 from __future__ import annotations
 
