@@ -156,6 +156,20 @@ class StorageSettings(Section):
     )
 
 
+class JournalSettings(Section):
+    """The journal: files from which everything that happened can be replayed bit for bit."""
+
+    folder: Path | None = Field(None, description="folder in which the journal is written; without it none is written")
+    max_file_mib: int = Field(256, ge=1, le=65536, description="a file larger than this is followed by a new one")
+    max_file_age_s: float = Field(
+        3600.0, ge=10, le=86400, description="a file older than this is followed by a new one"
+    )
+    max_total_mib: int = Field(20480, ge=2, description="the oldest files are removed so that all together stay below")
+    snapshot_every_s: float = Field(60.0, ge=1, le=3600, description="how often the state is recorded as a whole")
+    sweeps: bool = Field(False, description="record the raw sweeps of the radars too (several MB/s a radar)")
+    display: bool = Field(False, description="record what was sent to the displays too")
+
+
 class MqttSettings(Section):
     """Pavement nodes that speak MQTT."""
 
@@ -204,6 +218,7 @@ class Settings(BaseSettings):
     feed: FeedSettings = FeedSettings()
     limits: LimitsSettings = LimitsSettings()
     storage: StorageSettings = StorageSettings()
+    journal: JournalSettings = JournalSettings()
     mqtt: MqttSettings = MqttSettings()
     demo: DemoSettings = DemoSettings()
 
