@@ -9,12 +9,17 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import shutil
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 KEPT = 3
+"""Folders of older sources that stay, so that going back to them compiles nothing."""
+
+KERNEL = re.compile(rb"^\s*(?:from|import) (?:pipeline\.kernels\.compiled|numba)\b", re.MULTILINE)
+"""What a file that holds kernels imports."""
 
 
 def use_kernel_cache() -> None:
@@ -31,12 +36,19 @@ def use_kernel_cache() -> None:
         _make(folder)
 
 
-def _digest() -> str:
+def kernel_sources(root: Path = ROOT) -> list[Path]:
+    """All files that hold kernels, or say how kernels are compiled.
+
+    A kernel is decorated by `pipeline.kernels.compiled`; an intrinsic, and that file itself, import numba.
+    """
+    every = sorted((*(root / "pipeline").rglob("*.py"), root / "app" / "ingest" / "socket_kernel.py"))
+    return [path for path in every if KERNEL.search(path.read_bytes())]
+
+
+def _digest(root: Path = ROOT) -> str:
     found = hashlib.sha256(sys.version.encode())
-    for path in sorted((*(ROOT / "pipeline").rglob("*.py"), ROOT / "app" / "ingest" / "socket_kernel.py")):
-        source = path.read_bytes()
-        if b"njit" in source or b"intrinsic" in source:
-            found.update(path.name.encode() + source)
+    for path in kernel_sources(root):
+        found.update(path.name.encode() + path.read_bytes())
     return found.hexdigest()[:16]
 
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.detect.calibration import false_alarm_probability, mean_offsets_db, power_mean_offsets_db
@@ -20,6 +19,7 @@ from pipeline.detect.checks import check_block, check_pfa, check_start, check_wh
 from pipeline.detect.limits import limits_used
 from pipeline.detect.window import BEYOND, Window, WindowState, window_fields
 from pipeline.kernels.bits import borrowed
+from pipeline.kernels.compiled import allocating
 from pipeline.kernels.recent_rows import take_row
 from pipeline.kernels.run_cap import CapSettings, detect_row
 from pipeline.state import read_only
@@ -131,7 +131,7 @@ class CellAveraging:
 PART = CellAveraging
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _detect(amplitude: Any, rows: Any, masks: Any, window: Any, tables: Any, memory: Any, cap: Any) -> None:
     amplitude, rows = borrowed(amplitude), borrowed(rows)
     mask, grown = borrowed(masks[0]), borrowed(masks[1])
@@ -165,7 +165,7 @@ def _detect(amplitude: Any, rows: Any, masks: Any, window: Any, tables: Any, mem
         detect_row(cells, threshold, growth, mask[i], grown[i], (refill, depth), budget, degraded, tail)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _add_up(stack: Any, end: int, values: Any, scale: float, margin: int, sums: Any) -> None:
     ranges = stack.shape[1]
     column = sums[margin + 1 : margin + 1 + ranges]
@@ -185,7 +185,7 @@ def _add_up(stack: Any, end: int, values: Any, scale: float, margin: int, sums: 
     sums[margin + 1 + ranges :] = total
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _limits(level: Any, number: Any, above: Any, scale: float, limits: Any, ranges: int) -> None:
     for j in range(ranges):
         mean = level[j] / max(number[j], 1)

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.detect.calibration import false_alarm_probability, order_offset_steps
@@ -20,6 +19,7 @@ from pipeline.detect.checks import check_block, check_pfa, check_start, check_wh
 from pipeline.detect.limits import limits_used
 from pipeline.detect.window import BEYOND, Window, WindowState, window_fields
 from pipeline.kernels.bits import borrowed
+from pipeline.kernels.compiled import allocating
 from pipeline.kernels.recent_rows import take_row
 from pipeline.kernels.run_cap import CapSettings, detect_row
 from pipeline.state import read_only
@@ -126,7 +126,7 @@ class OrderedStatistic:
 PART = OrderedStatistic
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _detect(amplitude: Any, rows: Any, masks: Any, window: Any, tables: Any, memory: Any, cap: Any) -> None:
     amplitude, rows = borrowed(amplitude), borrowed(rows)
     mask, grown = borrowed(masks[0]), borrowed(masks[1])
@@ -158,7 +158,7 @@ def _detect(amplitude: Any, rows: Any, masks: Any, window: Any, tables: Any, mem
         detect_row(cells, threshold, growth, mask[i], grown[i], (refill, depth), budget, degraded, tail)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _order(
     stack: Any, close: int, rows: int, guard: int, reach: int, count: Any, rank: Any, histogram: Any, level: Any
 ) -> None:
