@@ -21,6 +21,9 @@ KEPT = 3
 KERNEL = re.compile(rb"^\s*(?:from|import) (?:pipeline\.kernels\.compiled|numba)\b", re.MULTILINE)
 """What a file that holds kernels imports."""
 
+CONSTANTS = re.compile(rb"^from (pipeline[\w.]*) import (?:\([^)]*?|[^(\n]*?)\b[A-Z][A-Z0-9_]+\b", re.MULTILINE)
+"""An import of at least one constant, a name in capitals, from a module of the core."""
+
 
 def use_kernel_cache() -> None:
     """Point numba to the folder of exactly these sources; of older ones the newest few are kept.
@@ -37,12 +40,16 @@ def use_kernel_cache() -> None:
 
 
 def kernel_sources(root: Path = ROOT) -> list[Path]:
-    """All files that hold kernels, or say how kernels are compiled.
+    """All files that hold kernels or say how kernels are compiled, and those they take constants from.
 
-    A kernel is decorated by `pipeline.kernels.compiled`; an intrinsic, and that file itself, import numba.
+    A kernel is decorated by `pipeline.kernels.compiled`; an intrinsic, and that file itself, import numba. A constant
+    of another file is compiled into the kernel as a number.
     """
-    every = sorted((*(root / "pipeline").rglob("*.py"), root / "app" / "ingest" / "socket_kernel.py"))
-    return [path for path in every if KERNEL.search(path.read_bytes())]
+    every = (*(root / "pipeline").rglob("*.py"), root / "app" / "ingest" / "socket_kernel.py")
+    kernels = {path: source for path in every if KERNEL.search(source := path.read_bytes())}
+    modules = {module for source in kernels.values() for module in CONSTANTS.findall(source)}
+    named = {root / f"{module.decode().replace('.', '/')}{end}" for module in modules for end in (".py", "/__init__.py")}
+    return sorted(kernels.keys() | {path for path in named if path.is_file()})
 
 
 def _digest(root: Path = ROOT) -> str:

@@ -44,10 +44,11 @@ def test_old_folders_go_and_the_newest_stay(tmp_path: Path) -> None:
 
 def test_every_file_that_names_numba_or_a_decorator_of_kernels_counts() -> None:
     counted = {path.relative_to(kernel_cache.ROOT).as_posix() for path in kernel_cache.kernel_sources()}
-    for known in ("compiled", "bits", "tiles", "adaptive", "growth", "correlate", "recent_rows"):
+    for known in ("compiled", "bits", "tiles", "adaptive", "growth", "correlate", "recent_rows", "component_state"):
         assert f"pipeline/kernels/{known}.py" in counted
     assert {"pipeline/detect/ca.py", "pipeline/track/look.py", "app/ingest/socket_kernel.py"} <= counted
-    assert "pipeline/sites.py" not in counted
+    assert "pipeline/detect/macro_cells.py" in counted  # its constants are compiled into the kernels of `hybrid`
+    assert "pipeline/detect/calibration.py" not in counted
 
 
 @pytest.mark.parametrize(
@@ -68,4 +69,24 @@ def test_a_changed_kernel_gets_a_new_folder(name: str, text: str, tmp_path: Path
     (tmp_path / "pipeline/sites.py").write_text("MOST = 3\n")
     assert kernel_cache._digest(tmp_path) == before
     (tmp_path / name).write_text(text + "LEAST = 2\n")
+    assert kernel_cache._digest(tmp_path) != before
+
+
+def test_a_changed_constant_of_another_file_gets_a_new_folder(tmp_path: Path) -> None:
+    files = {
+        "app/ingest/socket_kernel.py": "",
+        "pipeline/kernels/one.py": "import numpy\n\nfrom pipeline.kernels.compiled import kernel\n"
+        "from pipeline.limits import MOST\nfrom pipeline.many import (\n    least,\n    LEAST,\n)\n"
+        "from pipeline.names import Name, name\n",
+        "pipeline/limits.py": "MOST = 1\n",
+        "pipeline/many/__init__.py": "LEAST = 1\n",
+        "pipeline/names.py": "class Name: ...\n",
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    counted = [path.relative_to(tmp_path).as_posix() for path in kernel_cache.kernel_sources(tmp_path)]
+    assert counted == ["pipeline/kernels/one.py", "pipeline/limits.py", "pipeline/many/__init__.py"]
+    before = kernel_cache._digest(tmp_path)
+    (tmp_path / "pipeline/limits.py").write_text("MOST = 2\n")
     assert kernel_cache._digest(tmp_path) != before
