@@ -48,7 +48,9 @@ def kernel_sources(root: Path = ROOT) -> list[Path]:
     every = (*(root / "pipeline").rglob("*.py"), root / "app" / "ingest" / "socket_kernel.py")
     kernels = {path: source for path in every if KERNEL.search(source := path.read_bytes())}
     modules = {module for source in kernels.values() for module in CONSTANTS.findall(source)}
-    named = {root / f"{module.decode().replace('.', '/')}{end}" for module in modules for end in (".py", "/__init__.py")}
+    named = {
+        root / f"{module.decode().replace('.', '/')}{end}" for module in modules for end in (".py", "/__init__.py")
+    }
     return sorted(kernels.keys() | {path for path in named if path.is_file()})
 
 
