@@ -7,14 +7,25 @@ and are kept on disk (`app.kernel_cache` says where).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, ParamSpec, Protocol, TypeVar
 
 from numba import njit
 
+Given = ParamSpec("Given")
+Result = TypeVar("Result")
+
+
+class Decorator(Protocol):
+    """What compiles a function; its callers are checked against the annotations of the function."""
+
+    def __call__(self, function: Callable[Given, Result], /) -> Callable[Given, Result]: ...  # noqa: D102
+
+
 _compiled: Any = partial(njit, nogil=True, cache=True)
 
-allocating: Any = _compiled
+allocating: Decorator = _compiled
 """With numba's reference counting: the kernel may allocate arrays, and may be handed any array.
 
 The one to begin with. Each slice that is handed to another kernel costs an atomic increment and decrement, which is
@@ -31,14 +42,14 @@ For kernels that only read and write what they are given, and call others with s
 inlined: Any = partial(kernel, forceinline=True)
 """As `kernel`, for a function so small, or called with so many arguments, that a call would cost more than it does."""
 
-unchecked_division: Any = partial(_compiled, error_model="numpy")
+unchecked_division: Decorator = partial(_compiled, error_model="numpy")
 """As `allocating`, but a division by zero gives an infinity or nan, as in numpy, instead of an exception.
 
 Without the test for zero loops with divisions become vector instructions. Only where no divisor can be zero, or where
 what comes of it is dealt with.
 """
 
-reassociating: Any = partial(_compiled, fastmath=True)
+reassociating: Decorator = partial(_compiled, fastmath=True)
 """As `allocating`, but the compiler may add and multiply floating point numbers in another order, and takes it that
 none of them is nan or infinite.
 
