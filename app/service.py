@@ -12,6 +12,7 @@ from app.assembly import FRONT_END, build_parts, chain_of, check_parts, node_sit
 from app.contract import FrontEnd, PictureListener, Readiness, Refused, ReplayControl, UnknownId, Video
 from app.ingest.octets import OctetIntake
 from app.ingest.udp import VideoReceiver
+from app.journal.recorder import JournalRecorder
 from app.runtime.compile_apart import CompilerApart
 from app.runtime.front_end import FrontEndSwitch
 from app.runtime.radar_worker import RadarWorker
@@ -61,6 +62,7 @@ class SurfaceService:
         )
         self._receivers: dict[str, VideoReceiver] = {}
         self._surface: SurfaceWorker | None = None
+        self._journal: JournalRecorder | None = None
         self._heard: dict[str, tuple[float, float, int]] = {}
         self._octets = {
             site.id: OctetIntake(site, index, radar.blocks_per_scan)
@@ -77,8 +79,16 @@ class SurfaceService:
             self.settings, self.airport, self.radars, self.nodes, first_alert=first_alert, clock=time.perf_counter
         )
         engine.tracker.warm()
+        if self.settings.journal.folder is not None:
+            self._journal = JournalRecorder(self.settings, self.airport_geojson, self.settings.journal)
+            self.extra_sensors.append(self._journal.state)
         self._surface = SurfaceWorker(
-            engine, self.sensors, self.settings.limits.rows_queued, self._stage_timings, self._expect
+            engine,
+            self.sensors,
+            self.settings.limits.rows_queued,
+            self._stage_timings,
+            self._expect,
+            recorder=self._journal,
         )
         for index, (site, radar) in enumerate(zip(self.radars, self.settings.radars, strict=True)):
             ground = surface_of_radar(self.airport, site)
@@ -114,6 +124,8 @@ class SurfaceService:
         self._keeper.stop()
         if self._surface is not None:
             self._surface.stop()
+        if self._journal is not None and not self._journal.close():
+            log.error("the end of the journal could not be written in time")
 
     def video_port(self, radar: str) -> int:
         """The UDP port that a radar's datagrams go to. Raises UnknownId."""

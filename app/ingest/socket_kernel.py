@@ -16,6 +16,8 @@ import numpy as np
 from numba.core import typing as numba_typing
 from numpy.typing import NDArray
 
+from pipeline.kernels.compiled import allocating
+
 AVAILABLE = sys.platform == "linux" and ctypes.sizeof(ctypes.c_void_p) == 8
 """This system has recvmmsg with the layout used here."""
 
@@ -95,7 +97,7 @@ class Ring:
                 self.dropped = int(self._control[row, 16:20].view(np.uint32)[0])
 
 
-@numba.njit(nogil=True, cache=True)
+@allocating
 def _receive(descriptor, headers, address, hold_s, clock, clock_address, out):  # type: ignore[no-untyped-def]
     lengths, truncated, arrival = out
     room = headers.shape[0]

@@ -40,6 +40,9 @@ class Recorder(Protocol):
     def after(self, outcome: Outcome) -> None:
         """That is what came of it."""
 
+    def sensors(self, states: tuple[SensorState, ...]) -> None:
+        """The health of all sensors, as it goes out with the newest picture."""
+
 
 class SurfaceWorker:
     """Owns the engine: nobody else touches it.
@@ -192,6 +195,8 @@ class SurfaceWorker:
         known = sensors if sensors is not None else (self.newest.sensors if self.newest is not None else ())
         picture = replace(newest, sensors=known, timings={**self._timings(), **newest.timings})
         self.newest = picture
+        if self._recorder is not None:
+            self._recorder.sensors(known)
         try:
             self._expect(picture)
         except Exception:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from pipeline.kernels.compiled import allocating
 
 COUNTERS = (
     "taken",  # messages that found their row
@@ -92,7 +93,7 @@ def new_state() -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     return state, np.zeros(2)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def order(fields, arrival, rules, state, clock, seen, counts, placed, times):  # type: ignore[no-untyped-def]
     """Fill `placed` (n, 4) and `times` (n, 2: UTC s, azimuth rad or nan for the grid's own) for messages `fields`.
 
@@ -133,7 +134,7 @@ def order(fields, arrival, rules, state, clock, seen, counts, placed, times):  #
             clock[LAST_ARRIVAL] = arrival[i]
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _sequence(one, state, seen, counts):  # type: ignore[no-untyped-def]
     """0 in order, 1 late, -1 not to be taken."""
     message = one[0]
@@ -179,7 +180,7 @@ def _sequence(one, state, seen, counts):  # type: ignore[no-untyped-def]
     return 1 if late else 0
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _restart(message, state, seen, counts):  # type: ignore[no-untyped-def]
     counts[RESTART] += 1
     seen[:] = -1
@@ -190,7 +191,7 @@ def _restart(message, state, seen, counts):  # type: ignore[no-untyped-def]
     state[GAP] = 1
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _fits(one, rules, counts):  # type: ignore[no-untyped-def]
     """Cells, cell duration and azimuths are such as the grid can take."""
     reach = one[3] + one[5]
@@ -207,7 +208,7 @@ def _fits(one, rules, counts):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _time(count, arrival, late, state, clock, counts):  # type: ignore[no-untyped-def]
     """UTC of the message; nan when it is not to be taken."""
     if count < 0:
@@ -237,7 +238,7 @@ def _time(count, arrival, late, state, clock, counts):  # type: ignore[no-untype
     return _of_day(count, arrival, arrival)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _of_day(count, arrival, near):  # type: ignore[no-untyped-def]
     """UTC of a time of day: on the day that brings it next to `near`; the arrival when there is none."""
     if count < 0:
@@ -250,7 +251,7 @@ def _of_day(count, arrival, near):  # type: ignore[no-untyped-def]
     return time
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _rows(one, rules, state, late):  # type: ignore[no-untyped-def]
     """(first grid row, rows, azimuth of the centre or nan) that the message covers."""
     start, width = one[1], (one[2] - one[1]) & 0xFFFF
@@ -277,7 +278,7 @@ def _rows(one, rules, state, late):  # type: ignore[no-untyped-def]
     return first, 1, middle * (2 * np.pi / FINE)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _turn(row, time, late, rules, state, clock, counts):  # type: ignore[no-untyped-def]
     """Absolute row (turn * azimuths + row) of a row of the grid; -1 when it is not to be taken."""
     azimuths = rules.azimuths

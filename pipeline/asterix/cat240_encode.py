@@ -9,8 +9,9 @@ from __future__ import annotations
 import struct
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from pipeline.kernels.compiled import allocating
 
 MAX_DATAGRAM = 1472
 """The UDP payload that fits one Ethernet frame of 1,500 octets."""
@@ -147,7 +148,7 @@ def encode_summary(text: str, *, sac: int = 0, sic: int = 0) -> bytes:
     return b"\xf0" + struct.pack(">H", 3 + len(record)) + record
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _encode(amplitude, start, end, time, first_message, sac, sic, femto, start_cell, chunk, datagrams, lengths):  # type: ignore[no-untyped-def]
     ranges = amplitude.shape[1]
     parts = (ranges + chunk - 1) // chunk
@@ -194,7 +195,7 @@ def _encode(amplitude, start, end, time, first_message, sac, sic, femto, start_c
             lengths[m] = size
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _put4(out, at, value):  # type: ignore[no-untyped-def]
     out[at] = (value >> 24) & 255
     out[at + 1] = (value >> 16) & 255

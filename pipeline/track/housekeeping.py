@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from pipeline.contracts.associate import Expected
+from pipeline.kernels.compiled import allocating
 from pipeline.tables import TargetCategory, TargetClass, TrackPhase
 from pipeline.tables.arrays import Array, Floats
 from pipeline.track.core import Core, end, judge, strip_identity
@@ -90,7 +90,7 @@ def _end_parts(core: Core) -> None:
     end(core, gone)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _doubles(
     order: Array,
     state: Floats,

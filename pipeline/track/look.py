@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from pipeline.kernels.compiled import allocating
 from pipeline.sites import RadarSite
 from pipeline.tables.arrays import Array, Floats
 
@@ -91,7 +91,7 @@ MOST_GUARD = 0.25
 """Radians to both sides that a look waits for at most: a loose track near the radar is not worth a long delay."""
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _plan(
     radar: Floats, closed_to: int, time: Floats, state: Floats, cov: Floats, extent: Floats, looked: Array,
     gate: float, max_gate: float, row: Array, at: Floats, guard: Floats, due: Array, covered: Array,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from pipeline.airport.model import SurfaceKind
+from pipeline.kernels.compiled import allocating
 from pipeline.tables import TargetClass, TrackPhase
 from pipeline.tables.arrays import Array, Floats
 from pipeline.track.core import Core, end
@@ -126,7 +126,7 @@ def absorb(core: Core, senior: int, junior: int) -> None:
     table.moved[senior] |= table.moved[junior]
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _parts(
     order: Array, state: Floats, cov: Floats, extent: Floats, seen: Floats, named: Array, aircraft: Array,
     apron: Array, still: Array, rank: Floats, margin: float, whole: Array,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from pipeline.airport.model import SurfaceKind
 from pipeline.contracts.associate import Expected, Measured
+from pipeline.kernels.compiled import allocating
 from pipeline.tables import Plots, SectorPlots, Source, TrackPhase
 from pipeline.tables.arrays import Array, Floats
 from pipeline.track.core import Core, start, take
@@ -309,7 +309,7 @@ def _begin(core: Core, sector: SectorPlots, plots: Plots, plot_rows: Array, posi
     core.table.axis[made] = shape[:k, 2] % math.pi
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _inside(
     track_time: Floats, state: Floats, extent: Floats, unsure: Floats, settled: Array, time: Floats, position: Floats,
     slack: Floats, shape: Floats, least: float, owner: Array,

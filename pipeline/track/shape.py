@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from pipeline.kernels.compiled import allocating
 from pipeline.tables import Plots
 from pipeline.tables.arrays import Array, Floats
 
@@ -68,7 +68,7 @@ def reshape(
     _reshape(settings, rows, state, covariance, moved, plot, bearing_sd, length, width, heading, axis, moving, shapes)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _plot_extents(
     length: Array,
     width: Array,
@@ -91,7 +91,7 @@ def _plot_extents(
         out[k, 2] = direction
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _extents(length: Floats, width: Floats, heading: Floats, axis: Floats, body: Floats, out: Floats) -> None:
     for k in range(len(out)):
         direction = heading[k] if math.isfinite(heading[k]) else axis[k]
@@ -101,7 +101,7 @@ def _extents(length: Floats, width: Floats, heading: Floats, axis: Floats, body:
         out[k, 2] = direction if math.isfinite(direction) else 0.0
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _wander(extent: Floats, part: float, noise: Floats) -> None:
     for k in range(len(extent)):
         direction = extent[k, 2]
@@ -115,19 +115,19 @@ def _wander(extent: Floats, part: float, noise: Floats) -> None:
         noise[k, 1, 0] += (along - across) * s * c
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _axis_difference(a: float, b: float) -> float:
     """a - b of two directions without sense, in (-pi/2, pi/2]."""
     return (a - b + 0.5 * math.pi) % math.pi - 0.5 * math.pi
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _turn(a: float, b: float) -> float:
     """a - b of two directions, in (-pi, pi]."""
     return (a - b + math.pi) % (2 * math.pi) - math.pi
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _reshape(
     rule: Floats, rows: Array, state: Floats, cov: Floats, moved: Array, plot: Floats, bearing_sd: Array,
     length: Floats, width: Floats, heading: Floats, axis: Floats, moving: Array, shapes: Array,
