@@ -1,4 +1,4 @@
-"""`airside replay`: send a recording of radar video to the service, or look at its plots."""
+"""`airside replay`: send a recording of radar video to a running service, or replay a journal."""
 
 from __future__ import annotations
 
@@ -21,7 +21,11 @@ def register(app: typer.Typer) -> None:
 
 def replay(
     file: Annotated[
-        Path, typer.Argument(help=".npz (scans, t), a folder of polar PNGs with a YAML, .pcap or .pcapng.")
+        Path,
+        typer.Argument(
+            help="A journal (.mcap, or the folder of one), or radar video: .npz (scans, t), a folder of polar PNGs with a"
+            " YAML, .pcap or .pcapng."
+        ),
     ],
     radar: Annotated[
         str | None, typer.Option(help="Which radar of the settings it stands in for; the first if none.")
@@ -30,15 +34,31 @@ def replay(
     to: Annotated[
         str | None, typer.Option(help="udp://host:port; the radar's own port on this machine if none.")
     ] = None,
-    headless: Annotated[bool, typer.Option("--headless", help="Send nothing; print the plots of each turn.")] = False,
+    headless: Annotated[
+        bool, typer.Option("--headless", help="Serve and send nothing: print what the engine or the detector makes of it.")
+    ] = False,
     loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end.")] = False,
     port: Annotated[int | None, typer.Option(min=1, max=65535, help="Take only this UDP port of a capture.")] = None,
+    verify: Annotated[
+        bool, typer.Option("--verify", help="Journal: compare every bit with what was recorded (with --headless).")
+    ] = False,
+    begin: Annotated[str | None, typer.Option("--from", help="Journal: not before, UTC, ISO 8601, s or +s.")] = None,
+    until: Annotated[str | None, typer.Option("--until", help="Journal: not after, in the same forms.")] = None,
+    change: Annotated[
+        list[str] | None, typer.Option("--set", help="Journal: another setting, as in parts.lifecycle=m_of_n.")
+    ] = None,
+    http_port: Annotated[int, typer.Option("--http-port", min=0, help="Journal: where the displays are served.")] = 8000,
     settings: Annotated[
         Path | None, typer.Option("--settings", "-s", envvar="AIRSIDE_SETTINGS", help="Settings of the service.")
     ] = None,
 ) -> None:
-    """Send a recording as ASTERIX CAT240 to a running service, as if the radar were turning now.
+    """Replay a journal, or send recorded radar video to a running service.
 
+    [bold]airside replay day.mcap[/bold] serves the displays with the picture of that day, to play, pause and seek;
+    [bold]airside replay day.mcap --headless --verify[/bold] proves that the same inputs give the same bits;
+    [bold]airside replay day.mcap --headless --set parts.lifecycle=m_of_n[/bold] says what would have been different.
+
+    Radar video is sent as ASTERIX CAT240, as if the radar were turning now:
     [bold]airside replay turns.npz[/bold] sends to the first radar of the settings on this machine;
     [bold]airside replay turns.pcap --to udp://239.1.2.3:8600[/bold] to wherever you say;
     [bold]airside replay turns.npz --headless[/bold] prints what the detector makes of it.
@@ -48,9 +68,15 @@ def replay(
     from app.console import fail
     from app.contract import Refused
     from app.ingest.recordings import open_recording
+    from app.replay.command import is_journal
     from app.settings import SettingsError, load
 
     console = Console()
+    if is_journal(file):
+        _replay_journal(console, file, speed, headless, verify, (begin, until), tuple(change or ()), http_port)
+        return
+    if verify or begin or until or change:
+        raise fail(f"{file}: --verify, --from, --until and --set are for journals (.mcap)")
     try:
         recording = open_recording(file, port=port)
         _describe(console, recording)
@@ -67,6 +93,38 @@ def replay(
         raise fail(str(error)) from error
     except KeyboardInterrupt:
         raise typer.Exit(130) from None
+
+
+def _replay_journal(
+    console: Console,
+    path: Path,
+    speed: float,
+    headless: bool,
+    verify: bool,
+    times: tuple[str | None, str | None],
+    change: tuple[str, ...],
+    port: int,
+) -> None:
+    from app.console import fail
+    from app.journal.names import JournalError
+    from app.replay.command import JournalReplay
+    from app.settings import SettingsError
+
+    try:
+        work = JournalReplay(console, path, times, change)
+        if verify and (change or not headless):
+            raise SettingsError("--verify goes with --headless, and not with --set")
+        if verify:
+            status = work.verify()
+        elif headless:
+            status = work.compare()
+        else:
+            status = work.serve(port, speed)
+    except (JournalError, SettingsError, OSError) as error:
+        raise fail(str(error)) from error
+    except KeyboardInterrupt:
+        raise typer.Exit(130) from None
+    raise typer.Exit(status)
 
 
 def _describe(console: Console, recording: Recording) -> None:
