@@ -71,7 +71,7 @@ class JournalFile:
 
     @cached_property
     def chunks(self) -> list[ChunkIndex]:
-        """All complete chunks, with what they hold; from the index behind each, or from the chunk where there is none."""
+        """All complete chunks, with what they hold: from the index behind each, or from the chunk if there is none."""
         with self._open() as file:
             return self._scan(file)
 
@@ -107,10 +107,10 @@ class JournalFile:
         """The topic of a channel."""
         return self._channels[channel]
 
-    def records(self, first_chunk: int = 0) -> Iterator[Record]:
-        """All records from a chunk on, in order. Raises JournalError at a damaged chunk."""
+    def records(self, first_chunk: int = 0, end_chunk: int | None = None) -> Iterator[Record]:
+        """All records from a chunk on, in order, before `end_chunk`. Raises JournalError at a damaged chunk."""
         with self._open() as file:
-            for chunk in self.chunks[first_chunk:]:
+            for chunk in self.chunks[first_chunk:end_chunk]:
                 yield from self._chunk_records(file, chunk)
 
     def check(self) -> None:
@@ -153,7 +153,7 @@ class JournalFile:
         if not {"run", "file", "format"} <= set(one.metadata):
             raise self._walk.damaged(mark.at, "the description of a run is not whole")
         self._runs.append(one.metadata)
-        return one.metadata["run"]
+        return str(one.metadata["run"])
 
     def _take_attachment(self, file: BinaryIO, mark: Mark, run: str) -> None:
         data = self._walk.content(file, mark)
