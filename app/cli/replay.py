@@ -35,7 +35,8 @@ def replay(
         str | None, typer.Option(help="udp://host:port; the radar's own port on this machine if none.")
     ] = None,
     headless: Annotated[
-        bool, typer.Option("--headless", help="Serve and send nothing: print what the engine or the detector makes of it.")
+        bool,
+        typer.Option("--headless", help="Serve and send nothing: print what the engine or the detector makes of it."),
     ] = False,
     loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end.")] = False,
     port: Annotated[int | None, typer.Option(min=1, max=65535, help="Take only this UDP port of a capture.")] = None,
@@ -47,7 +48,9 @@ def replay(
     change: Annotated[
         list[str] | None, typer.Option("--set", help="Journal: another setting, as in parts.lifecycle=m_of_n.")
     ] = None,
-    http_port: Annotated[int, typer.Option("--http-port", min=0, help="Journal: where the displays are served.")] = 8000,
+    http_port: Annotated[
+        int, typer.Option("--http-port", min=0, help="Journal: where the displays are served.")
+    ] = 8000,
     settings: Annotated[
         Path | None, typer.Option("--settings", "-s", envvar="AIRSIDE_SETTINGS", help="Settings of the service.")
     ] = None,

@@ -71,7 +71,7 @@ class JournalFile:
 
     @cached_property
     def chunks(self) -> list[ChunkIndex]:
-        """All complete chunks with what they hold: from the index behind each, or from the chunk itself."""
+        """All complete chunks, with what they hold: from the index behind each, or from the chunk if there is none."""
         with self._open() as file:
             return self._scan(file)
 
@@ -105,12 +105,12 @@ class JournalFile:
 
     def topic(self, channel: int) -> str:
         """The topic of a channel."""
-        return str(self._channels[channel])
+        return self._channels[channel]
 
-    def records(self, first_chunk: int = 0) -> Iterator[Record]:
-        """All records from a chunk on, in order. Raises JournalError at a damaged chunk."""
+    def records(self, first_chunk: int = 0, end_chunk: int | None = None) -> Iterator[Record]:
+        """All records from a chunk on, in order, before `end_chunk`. Raises JournalError at a damaged chunk."""
         with self._open() as file:
-            for chunk in self.chunks[first_chunk:]:
+            for chunk in self.chunks[first_chunk:end_chunk]:
                 yield from self._chunk_records(file, chunk)
 
     def check(self) -> None:
@@ -235,6 +235,14 @@ class Journal:
             for chunk in file.chunks:
                 for _, at, _ in chunk.messages:
                     return seconds(at)
+        return None
+
+    def last_time(self) -> float | None:
+        """UTC s of the last record; None when there is none."""
+        for file in reversed(self.files):
+            for chunk in reversed(file.chunks):
+                if chunk.messages:
+                    return max(seconds(at) for _, at, _ in chunk.messages)
         return None
 
     def _place(self, since: float) -> tuple[int, int, int | None]:
