@@ -6,6 +6,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from app.assembly import FRONT_END, build_parts, chain_of, check_parts, node_site, radar_site, surface_engine
@@ -21,7 +22,7 @@ from app.runtime.surface_worker import SurfaceWorker
 from app.settings import Settings
 from pipeline.airport.model import Airport
 from pipeline.airport.surfaces import surface_of_radar
-from pipeline.inputs import Acknowledge, Command, SetRunway
+from pipeline.inputs import Acknowledge, Command, PartsChanged, SetRunway
 from pipeline.picture import Alert, AlertChange, Picture, RunwayState, SensorState, Visibility
 from pipeline.sites import RadarSite
 from pipeline.tables import NodeEvents, TargetReports
@@ -97,7 +98,9 @@ class SurfaceService:
             if resume:
                 self._keeper.take_up(chain)
             worker = RadarWorker(site, chain, self.settings.limits.blocks_queued, self._surface.offer)
-            self._switches[site.id] = FrontEndSwitch(worker, index, ground, self._compiler)
+            self._switches[site.id] = FrontEndSwitch(
+                worker, index, ground, self._compiler, partial(self._parts_changed, site.id)
+            )
             self._workers[site.id] = worker
             if radar.udp is not None:
                 self._receivers[site.id] = VideoReceiver(site, index, radar, worker.put)
@@ -184,6 +187,10 @@ class SurfaceService:
         """Set how a runway is used."""
         state: RunwayState = self._carried_out(SetRunway(runway, open, in_use, visibility), runway)
         return state
+
+    def _parts_changed(self, radar: str, parts: dict[str, Any]) -> None:
+        """For those who read the journal: the engine itself does not mind."""
+        self._running.offer(PartsChanged(radar, parts))
 
     def _carried_out(self, command: Command, id: int | str) -> Any:
         """The engine's answer to a command about `id`. Raises UnknownId, Refused."""
