@@ -169,6 +169,11 @@ class JournalSettings(Section):
     sweeps: bool = Field(False, description="record the raw sweeps of the radars too (several MB/s a radar)")
     display: bool = Field(False, description="record what was sent to the displays too")
 
+    @field_validator("folder", mode="before")
+    @classmethod
+    def _empty_is_none(cls, value: Any) -> Any:
+        return None if value == "" else value
+
 
 class MqttSettings(Section):
     """Pavement nodes that speak MQTT."""

@@ -118,16 +118,17 @@ def _mapping(a: Mapping[Any, Any], b: Mapping[Any, Any], path: str) -> str | Non
     for key, value in b.items():
         if key not in a:
             return _told(f"{path}[{key!r}]", "nothing", _shown(value))
-    if list(a) != list(b):
+    if [repr(key) for key in a] != [repr(key) for key in b]:
         return _told(path, f"keys in the order {_shown(list(a))}", f"keys in the order {_shown(list(b))}")
     return None
 
 
 def _set(a: Any, b: Any, path: str) -> str | None:
-    if a == b:
+    recorded, replayed = {repr(one) for one in a}, {repr(one) for one in b}  # 0.0, -0.0 and False are equal as members
+    if recorded == replayed:
         return None
-    only_a, only_b = sorted(a - b, key=repr), sorted(b - a, key=repr)
-    return _told(path, f"members {_shown(only_a)} only", f"members {_shown(only_b)} only")
+    only_a, only_b = (", ".join(sorted(one)) or "none" for one in (recorded - replayed, replayed - recorded))
+    return _told(path, f"only the members {only_a[:LONGEST]}", f"only the members {only_b[:LONGEST]}")
 
 
 def _sequence(a: Sequence[Any], b: Sequence[Any], path: str) -> str | None:

@@ -158,11 +158,13 @@ class JournalWriter:
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
         self._thread.start()
 
-    def put(self, topic: str, time: float, encode: Callable[[], bytes]) -> None:
+    def put(self, topic: str, time: float, encode: Callable[[], bytes], size: int | None = None) -> None:
         """Hand over a record. Never waits for the disk and raises nothing. time: UTC s of arrival.
 
-        encode: called in the writer's thread; what it reads must not change any more. What is put before the first
-        snapshot is not part of the journal; what does not fit into the queue is dropped up to the next snapshot.
+        encode: called in the writer's thread; what it reads must not change any more. size: octets of what it gives,
+        where the caller knows; otherwise the last record of that topic is taken for the measure.
+        What is put before the first snapshot is not part of the journal; what does not fit into the queue is dropped
+        up to the next snapshot.
         """
         with self._lock:
             if self._stopped or self._closed:
@@ -176,7 +178,8 @@ class JournalWriter:
             self._sequence += 1
             if snapshot:
                 self._last_snapshot = self._clock()
-            size = self._sizes.get(topic, FIRST_GUESS_BYTES)
+            if size is None:
+                size = self._sizes.get(topic, FIRST_GUESS_BYTES)
             room = self._waiting_bytes + size <= self._limits.queue_bytes or not self._items
             if (self._dropping is not None and not snapshot) or not room or self._full_of_records():
                 self._drop(time)

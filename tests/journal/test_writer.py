@@ -312,3 +312,48 @@ def test_compression_is_on(tmp_path: Path) -> None:
         writer.put("snapshot", START + number, lambda: NOISE)
     writer.close()
     assert journal_files(tmp_path)[0].stat().st_size < 100 * len(NOISE) / 10
+
+
+def test_what_was_put_is_on_the_disk_in_two_seconds(tmp_path: Path, clock: Hand) -> None:
+    writer = JournalWriter(tmp_path, {}, JournalLimits(), clock=clock)
+    put(writer, "snapshot", 0)
+    until(lambda: writer.state().counters.records == 1)
+    (path,) = journal_files(tmp_path)
+    assert list(JournalFile(path).records()) == []
+    clock.now += 1.9
+    until(lambda: len(list(JournalFile(path).records())) == 1)
+    writer.close()
+
+
+def test_the_size_that_the_caller_tells_counts(tmp_path: Path) -> None:
+    writer = JournalWriter(tmp_path, {}, replace(LIMITS, queue_bytes=1_000_000))
+    put_written(writer, "snapshot", 0)
+    go_on, reached = threading.Event(), threading.Event()
+
+    def slow() -> bytes:
+        reached.set()
+        assert go_on.wait(20)
+        return b"slow"
+
+    writer.put("sweeps", START + 1, slow)
+    assert reached.wait(20)
+    for number in range(2, 7):
+        writer.put("sweeps", START + number, lambda: b"x", 300_000)
+    assert writer.state().counters.dropped == 2
+    go_on.set()
+    assert writer.close()
+
+
+def test_a_failing_listener_hurts_nothing(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+
+    def broken(_: str) -> None:
+        raise RuntimeError
+
+    writer = JournalWriter(tmp_path / "file" / "journal", {}, LIMITS, broken)
+    assert writer.close()
+
+
+def test_an_empty_folder_in_the_settings_is_none() -> None:
+    assert JournalSettings(folder="").folder is None  # type: ignore[arg-type]
+    assert JournalSettings(folder="journal").folder == Path("journal")  # type: ignore[arg-type]
