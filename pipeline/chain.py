@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipeline.bearing.of_plots import Expectations, PlotBearings
+from pipeline.bearing.of_plots import NOTHING_EXPECTED, Expectations, PlotBearings
 from pipeline.contracts.bearing import BearingEstimator
 from pipeline.contracts.detect import Detector
 from pipeline.contracts.extract import Extractor
@@ -148,6 +148,34 @@ class RadarChain:
             raise
         self._next_row, self._closed_to, self._scans_before = (int(one) for one in rows)
         self.time = float(time[0])
+
+    def save_whole(self) -> dict[str, NDArray[Any]]:
+        """save() with all else that the next plots depend on: the newest turn, and which plots got a bearing."""
+        bearings = self._bearings
+        place = (-1, 0) if bearings is None else bearings.place
+        expected = NOTHING_EXPECTED if bearings is None else bearings.expected
+        return {
+            **self.save(),
+            "whole.newest": self.newest.copy(),
+            "whole.place": np.array(place, np.int64),
+            "whole.expected": expected.table(),
+        }
+
+    def restore_whole(self, saved: Mapping[str, NDArray[Any]]) -> None:
+        """Take up what save_whole() gave: the same blocks then give the same plots. Raises StateError."""
+        newest, place, expected = (saved.get(f"whole.{one}") for one in ("newest", "place", "expected"))
+        if newest is None or place is None or expected is None or newest.shape != self.newest.shape:
+            raise StateError("the saved state is not whole, or of another video format")
+        self.restore({name: array for name, array in saved.items() if not name.startswith("whole.")})
+        self.newest[...] = newest
+        if self._bearings is not None:
+            self._bearings.place = (int(place[0]), int(place[1]))
+            self._bearings.expected = Expectations.of(*expected)
+
+    @property
+    def expected(self) -> NDArray[np.float64]:
+        """(4, n) what expect() was last given, as far as it is used: east, north, heading, sd."""
+        return (NOTHING_EXPECTED if self._bearings is None else self._bearings.expected).table()
 
     def resume(self, saved: Mapping[str, NDArray[Any]]) -> None:
         """Take up what the detector of save() had learned, and count rows and scans anew: for the start of a process.

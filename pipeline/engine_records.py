@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from pipeline.alert.life import Case
 from pipeline.alert.monitor import MonitorState
@@ -20,6 +21,7 @@ from pipeline.inputs import (
 from pipeline.picture import Alert, AlertChange, AlertTarget, RunwayState, SensorState
 from pipeline.situation.holds import HoldMemory
 from pipeline.tables import SectorPlots, Sweeps, Tracks
+from pipeline.tables.arrays import Array, Floats
 from pipeline.track.false_plots import FalsePlots
 from pipeline.track.look import RadarClock
 from pipeline.track.table import TrackNumbers
@@ -43,11 +45,23 @@ class Shown:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ChainInput:
-    """What a radar's chain worked on. expected: what the tracks expected of headings when it did, None: unchanged."""
+class ChainBlock:
+    """What a radar's chain is about to work on.
+
+    expected: (4, n) what the tracks expect of headings (`RadarChain.expected`); None: as before.
+    """
 
     block: Sweeps
-    expected: tuple[object, ...] | None = None
+    expected: Floats | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChainState:
+    """A radar's chain before the next block. parts: of each verb its name and settings. state: `save_whole()`."""
+
+    radar: int
+    parts: dict[str, Any]
+    state: dict[str, Array]
 
 
 CODEC = ValueCodec(
@@ -55,13 +69,16 @@ CODEC = ValueCodec(
         Envelope, SectorPlots, Tick, ClockStep, SensorHealth, PartsChanged, Acknowledge, SetRunway,
         Shown, Alert, AlertTarget, AlertChange, RunwayState, SensorState,
         EngineState, RadarClock, FalsePlots, TrackNumbers, MonitorState, Case, Conflict, HoldMemory, Entry,
-        ChainInput, Sweeps,
+        ChainBlock, ChainState, Sweeps,
     )
 )  # fmt: skip
 """Knows every class that a journal holds, and no other."""
 
 INPUT, OUTPUT, SNAPSHOT, SENSORS = "input", "output", "snapshot", "sensors"
 """The topics of a journal: envelopes, what came of them (`Shown`), states of the engine, health of the sensors."""
+
+SWEEPS, CHAIN = "sweeps", "chain"
+"""Optional topics: blocks of raw sweeps (`ChainBlock`), and states of the radars' chains (`ChainState`)."""
 
 
 def shown(outcome: Outcome) -> Shown | None:

@@ -237,6 +237,11 @@ class Journal:
                     return seconds(at)
         return None
 
+    def topics(self) -> frozenset[str]:
+        """The topics of which there are records."""
+        used = {(file, channel) for file in self.files for chunk in file.chunks for channel, _, _ in chunk.messages}
+        return frozenset(file.topic(channel) for file, channel in used)
+
     def last_time(self) -> float | None:
         """UTC s of the last record; None when there is none."""
         for file in reversed(self.files):

@@ -140,6 +140,7 @@ class JournalWriter:
         self._dropping: _Gap | None = None
         self._begun = False
         self._snapshots_waiting = 0
+        self._snapshots_taken = 0
         self._last_snapshot: float | None = None
         self._closed = False
         self._stopped = ""
@@ -190,6 +191,12 @@ class JournalWriter:
             if snapshot:
                 self._begun = True
                 self._snapshots_waiting += 1
+                self._snapshots_taken += 1
+
+    @property
+    def snapshots_taken(self) -> int:
+        """How many snapshots were handed over; cheap."""
+        return self._snapshots_taken
 
     @property
     def wants_snapshot(self) -> bool:

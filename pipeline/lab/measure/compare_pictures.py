@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 
 from pipeline.picture import AlertChange
 from pipeline.tables import TrackPhase, Tracks
-from pipeline.tables.arrays import Bools, Floats
+from pipeline.tables.arrays import Array, Bools, Floats
 
 SAME_TARGET_M = 20.0
 """Tracks of both pictures that are each other's nearest within this are the same target: half a large aircraft."""
@@ -49,6 +49,11 @@ class _Side:
     unmatched: int = 0
     seen: set[tuple[int, float]] = field(default_factory=set)
     alerts: list[RaisedAlert] = field(default_factory=list)
+
+    @property
+    def alarms(self) -> int:
+        """Alerts that were alarms when they were raised."""
+        return sum(one.stage == "alarm" for one in self.alerts)
 
     def add(self, tracks: Tracks, matched: Bools) -> None:
         self.rows += len(tracks)
@@ -96,7 +101,7 @@ class PictureComparison:
             Figure("same target, distance, 95 %", 0.0, far, "m"),
             Figure("same target, other number", 0.0, number),
             Figure("alerts raised", len(a.alerts), len(b.alerts)),
-            Figure("of these alarms", *(sum(one.stage == "alarm" for one in side.alerts) for side in (a, b))),
+            Figure("of these alarms", a.alarms, b.alarms),
         )
 
     def alerts(self) -> tuple[list[RaisedAlert], list[RaisedAlert]]:
@@ -104,15 +109,15 @@ class PictureComparison:
         return alone(self.recorded.alerts, self.replayed.alerts), alone(self.replayed.alerts, self.recorded.alerts)
 
 
-def matched(one: Tracks, other: Tracks) -> tuple[np.ndarray, np.ndarray]:
+def matched(one: Tracks, other: Tracks) -> tuple[Array, Array]:
     """Rows of both tables (k,), (k,) that are each other's nearest within SAME_TARGET_M."""
     if not len(one) or not len(other):
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     first, second = KDTree(one.state[:, :2]), KDTree(other.state[:, :2])
-    away, there = second.query(one.state[:, :2])
-    _, back = first.query(other.state[:, :2])
+    found, counterpart = second.query(one.state[:, :2]), first.query(other.state[:, :2])
+    away, there, back = np.asarray(found[0]), np.asarray(found[1]), np.asarray(counterpart[1])
     rows = np.flatnonzero((away <= SAME_TARGET_M) & (back[there] == np.arange(len(one))))
-    return rows, np.asarray(there[rows])
+    return rows, there[rows]
 
 
 def raised(change: AlertChange) -> RaisedAlert:
