@@ -23,6 +23,9 @@ OWN_START_S = 1e9
 """Before September 2001: no sensor has a time like that, so it counts from when it was switched on."""
 
 DAY_S, YEAR_S = 86400.0, 365.2425 * 86400.0
+MOST_YEARS = 10_000
+"""More is not told exactly."""
+
 UNITS = ((1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds"))
 
 
@@ -35,7 +38,9 @@ def amount(offset: float) -> str:
         return f"{size:,.0f} s"
     if size < YEAR_S:
         return f"{size / DAY_S:.0f} days"
-    return f"{size / YEAR_S:,.0f} years"
+    if size < MOST_YEARS * YEAR_S:
+        return f"{size / YEAR_S:,.0f} years"
+    return f"over {MOST_YEARS:,} years"
 
 
 def side(offset: float) -> str:
@@ -60,7 +65,7 @@ def guess(offset: float, stated: float = math.nan) -> str:
     if quarters and near and abs(offset) <= LOCAL_MOST_S + LOCAL_TOLERANCE_S:
         return "local time?"
     days = round(offset / DAY_S)
-    if days and abs(offset - days * DAY_S) <= LOCAL_TOLERANCE_S:
+    if days and abs(offset) < YEAR_S and abs(offset - days * DAY_S) <= LOCAL_TOLERANCE_S:
         return "wrong date?"
     return ""
 

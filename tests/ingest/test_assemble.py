@@ -317,11 +317,12 @@ def leap(shown: str) -> list[VideoMessage]:
     """Four turns of a second over a leap second at the end of their second, as radars show it."""
     midnight = 20_001 * DAY
     messages = stream(4, t0=midnight - 2)
-    counts: dict[str, Callable[[float], float]] = {
+    table: dict[str, Callable[[float], float]] = {
         "23:59:60": lambda t: t if t < 2 else t - 2 + DAY if t < 3 else t - 3,
         "23:59:59 twice": lambda t: t if t < 2 else t - 3 + DAY if t < 3 else t - 3,
         "0:00:00 twice": lambda t: t if t < 2 else t - 2 if t < 3 else t - 3,
-    }[shown]
+    }
+    counts = table[shown]
     made = []
     for i, one in enumerate(messages):
         t = i / AZIMUTHS

@@ -38,3 +38,12 @@ def test_old_folders_go_and_the_newest_stay(tmp_path: Path) -> None:
         os.utime(tmp_path / f"old{number}", (number, number))
     folder(NUMBA_CACHE_DIR=str(tmp_path))
     assert {one.name for one in tmp_path.iterdir() if one.name.startswith("old")} == {"old3", "old4", "old5"}
+
+
+def test_a_folder_dated_in_the_future_does_not_outlive_the_others(tmp_path: Path) -> None:
+    for name, at in (("old1", 1.0), ("old2", 2.0), ("old3", 3.0), ("wrong", 4_080_000_000.0)):
+        (tmp_path / name).mkdir()
+        os.utime(tmp_path / name, (at, at))
+    folder(NUMBA_CACHE_DIR=str(tmp_path))
+    assert not (tmp_path / "wrong").exists()
+    assert (tmp_path / "old1").exists()

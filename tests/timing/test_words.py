@@ -25,6 +25,7 @@ NOW = 1.8e9
         (1234.0, "ahead 1,234 s"),
         (40 * 86_400.0 + 1234, "ahead 40 days"),
         (73 * 365.2425 * 86_400, "ahead 73 years"),
+        (1e300, "ahead over 10,000 years"),
         (math.nan, "not a time"),
         (-math.inf, "not a time"),
     ],
