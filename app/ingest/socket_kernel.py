@@ -51,7 +51,8 @@ class Ring:
     """Room for `count` datagrams of at most `width` octets.
 
     data: (count, width) uint8. lengths: (count,) int32, at most the width. arrival: (count,) float64 s of
-    `time.monotonic`. truncated: (count,) bool, the datagram was longer. After `receive` the first so many rows are filled. dropped:
+    `time.monotonic`. truncated: (count,) bool, the datagram was longer. After `receive` the first so many rows are
+    filled. dropped:
     datagrams that the socket had no room for since it was opened, modulo 2**32.
     """
 
