@@ -24,6 +24,14 @@ class Refused(ValueError):
     """The command or the data cannot be taken; the message says why."""
 
 
+class RefusedTime(Refused):
+    """Everything in a message is refused for its time. counts: rows by reason ("ahead", "behind", "invalid")."""
+
+    def __init__(self, message: str, counts: Mapping[str, int]) -> None:
+        super().__init__(message)
+        self.counts = dict(counts)
+
+
 @dataclass(frozen=True, slots=True)
 class Readiness:
     """What has been reached at start-up: every check by name, ready when all are true."""
@@ -147,8 +155,11 @@ class Service(Protocol):
     def submit_sweeps(self, radar: str, body: bytes) -> dict[str, int]:
         """Take sweeps in the documented octet form; counts taken and dropped. Raises UnknownId, Refused."""
 
-    def submit_node_events(self, events: NodeEvents) -> None:
-        """Take node events (their `node` is the index in `nodes`). Raises Refused when the queue is full."""
+    def submit_node_events(self, events: NodeEvents) -> dict[str, int]:
+        """Take node events (their `node` is the index in `nodes`); counts taken and, by reason, refused for their time.
 
-    def submit_target_reports(self, reports: TargetReports) -> None:
-        """Take target reports. Raises Refused when the queue is full."""
+        Raises RefusedTime when all are refused, Refused when the queue is full.
+        """
+
+    def submit_target_reports(self, reports: TargetReports) -> dict[str, int]:
+        """Take target reports; counts and raises like `submit_node_events`."""

@@ -12,6 +12,7 @@ import os
 import re
 import shutil
 import sys
+import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -64,7 +65,10 @@ def _digest(root: Path = ROOT) -> str:
 def _make(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        older = sorted((one for one in folder.parent.iterdir() if one != folder), key=lambda one: one.stat().st_mtime)
+        now = time.time()
+        others = [(one.stat().st_mtime, one) for one in folder.parent.iterdir() if one != folder]
+        # a time beyond the host's says nothing about the age: such a folder goes first
+        older = [one for _, one in sorted((made if made <= now else 0.0, one) for made, one in others)]
         for one in older[: max(0, len(older) - KEPT)]:
             shutil.rmtree(one, ignore_errors=True)
     except OSError:

@@ -42,6 +42,27 @@ class UdpSettings(Section):
     sic: int | None = Field(None, ge=0, le=255, description="take only this system identification code")
 
 
+class ClockSettings(Section):
+    """How the times that a source states are taken."""
+
+    mode: Literal["auto", "taken", "corrected", "arrival"] = Field(
+        "auto",
+        description="taken: as stated; corrected: the estimated offset of its clock is removed; arrival: stamped with "
+        "the time of arrival; auto: corrected only when latency cannot explain the offset",
+    )
+    max_offset_s: float = Field(
+        5.0, gt=0, description="further from the time of arrival it is refused; a radar's is corrected and said"
+    )
+    max_latency_s: float = Field(2.0, ge=0, description="so much behind is taken for latency, not for a wrong clock")
+
+
+class ClocksSettings(Section):
+    """The clocks of the sources that are not radars."""
+
+    reports: ClockSettings = ClockSettings()
+    nodes: ClockSettings = ClockSettings()
+
+
 class RadarSettings(Section):
     """One radar."""
 
@@ -59,6 +80,7 @@ class RadarSettings(Section):
     db_per_step: float = Field(0.3125, gt=0)
     blocks_per_scan: int = Field(32, ge=1, le=4096, description="sweeps are worked on in this many blocks a turn")
     simulated: bool = False
+    clock: ClockSettings = ClockSettings()
     udp: UdpSettings | None = UdpSettings()
 
 
@@ -225,6 +247,7 @@ class Settings(BaseSettings):
     storage: StorageSettings = StorageSettings()
     journal: JournalSettings = JournalSettings()
     mqtt: MqttSettings = MqttSettings()
+    clocks: ClocksSettings = ClocksSettings()
     demo: DemoSettings = DemoSettings()
 
     @property

@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.asterix.cat240_decode import DecodeError, SummaryMessage, VideoMessage, decode
+from pipeline.asterix.cat240_decode import LONGEST_DAY, DecodeError, SummaryMessage, VideoMessage, decode
 from pipeline.kernels.compiled import allocating
 
 
@@ -133,7 +133,7 @@ def _read(data, length, row, out):  # type: ignore[no-untyped-def]
     if timed:
         at = 32 + room
         time = np.int64(data[at]) << 16 | np.int64(data[at + 1]) << 8 | data[at + 2]
-    if duration == 0 or time >= 86400 * 128:
+    if duration == 0 or time >= LONGEST_DAY:
         return False
     out[0] = _get4(data, 8)
     out[1] = np.int64(data[12]) << 8 | data[13]

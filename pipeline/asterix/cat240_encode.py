@@ -90,10 +90,12 @@ def azimuth_counts(azimuth: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _time_counts(time_of_day: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Seconds since midnight to 1/128 s, -1 for nan."""
+    """Seconds since midnight to 1/128 s, -1 for nan; 86,400 and more is a leap second."""
     seconds = np.asarray(time_of_day, np.float64)
     known = np.isfinite(seconds)
-    counts = np.rint(np.where(known, seconds, 0.0) * TIME_STEPS).astype(np.int64) % (86400 * TIME_STEPS)
+    counts = np.rint(np.where(known, seconds, 0.0) * TIME_STEPS).astype(np.int64)
+    # what is rounded up to midnight belongs to the next day
+    counts = np.where(seconds >= 86400, counts, counts % (86400 * TIME_STEPS))
     return np.where(known, counts, -1)
 
 

@@ -90,3 +90,12 @@ def test_a_changed_constant_of_another_file_gets_a_new_folder(tmp_path: Path) ->
     before = kernel_cache._digest(tmp_path)
     (tmp_path / "pipeline/limits.py").write_text("MOST = 2\n")
     assert kernel_cache._digest(tmp_path) != before
+
+
+def test_a_folder_dated_in_the_future_does_not_outlive_the_others(tmp_path: Path) -> None:
+    for name, at in (("old1", 1.0), ("old2", 2.0), ("old3", 3.0), ("wrong", 4_080_000_000.0)):
+        (tmp_path / name).mkdir()
+        os.utime(tmp_path / name, (at, at))
+    folder(NUMBA_CACHE_DIR=str(tmp_path))
+    assert not (tmp_path / "wrong").exists()
+    assert (tmp_path / "old1").exists()

@@ -366,11 +366,13 @@ class FakeService:
         self.sweeps.append(body)
         return {"taken": 1, "dropped": 0}
 
-    def submit_node_events(self, events: NodeEvents) -> None:
+    def submit_node_events(self, events: NodeEvents) -> dict[str, int]:
         self.node_events.append(events)
+        return {"taken": len(events)}
 
-    def submit_target_reports(self, reports: TargetReports) -> None:
+    def submit_target_reports(self, reports: TargetReports) -> dict[str, int]:
         self.target_reports.append(reports)
+        return {"taken": len(reports)}
 
 
 def main() -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from pipeline.tables import NodeEvents, Plots, Table, TargetReports, Tracks
 from pipeline.tables.codec import CodecError, decode, encode, known_tables, layout_of, table_name
-from tests.tables.made import KINDS, same_bits, table_of, tables
+from tests.pipeline.tables.made import KINDS, same_bits, table_of, tables
 
 
 @given(tables, st.booleans(), st.booleans())

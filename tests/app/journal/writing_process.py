@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from app.journal.writer import JournalWriter
-from tests.journal.writing import ATTACHMENTS, LIMITS, put
+from tests.app.journal.writing import ATTACHMENTS, LIMITS, put
 
 
 def main() -> None:

@@ -23,7 +23,7 @@ from app.journal.walk import Walk
 from pipeline.tables import NodeEvents
 from pipeline.tables.codec import encode
 from pipeline.values import ValueCodec
-from tests.journal.writing import ATTACHMENTS, START, body, chunked
+from tests.app.journal.writing import ATTACHMENTS, START, body, chunked
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -181,7 +181,7 @@ def test_files_packed_anew_by_other_tools_and_without_an_index(tmp_path: Path, c
 
 def test_a_writer_that_is_killed_leaves_a_file_that_opens(tmp_path: Path) -> None:
     process = subprocess.Popen(
-        [sys.executable, "-m", "tests.journal.writing_process", str(tmp_path)],
+        [sys.executable, "-m", "tests.app.journal.writing_process", str(tmp_path)],
         cwd=ROOT,
         stdout=subprocess.PIPE,
         text=True,

@@ -20,7 +20,7 @@ from app.journal.reader import JournalFile, open_journal
 from app.journal.writer import JournalLimits, JournalWriter
 from app.settings import JournalSettings
 from pipeline.values import ValueCodec
-from tests.journal.writing import ATTACHMENTS, LIMITS, NOISE, START, Hand, body, put, put_written, until
+from tests.app.journal.writing import ATTACHMENTS, LIMITS, NOISE, START, Hand, body, put, put_written, until
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from app.journal.output import JournalOutput
 from app.journal.reader import JournalFile, open_journal
 from app.journal.times import moment
 from pipeline.values import ValueCodec
-from tests.journal.writing import ATTACHMENTS, START, chunked
+from tests.app.journal.writing import ATTACHMENTS, START, chunked
 
 run = CliRunner()
 
