@@ -15,6 +15,7 @@ from app.contract import FrontEnd, PictureListener, Readiness, Refused, RefusedT
 from app.ingest.octets import OctetIntake
 from app.ingest.udp import VideoReceiver
 from app.journal.recorder import JournalRecorder
+from app.journal.video import VideoRecorder
 from app.runtime.clocks import FeedTimes, RadarTimes
 from app.runtime.compile_apart import CompilerApart
 from app.runtime.front_end import FrontEndSwitch
@@ -25,6 +26,7 @@ from app.runtime.surface_worker import SurfaceWorker
 from app.settings import Settings
 from pipeline.airport.model import Airport
 from pipeline.airport.surfaces import surface_of_radar
+from pipeline.chain import RadarChain
 from pipeline.inputs import Acknowledge, Command, PartsChanged, SetRunway
 from pipeline.picture import Alert, AlertChange, Picture, RunwayState, SensorState, Visibility
 from pipeline.sites import RadarSite
@@ -106,6 +108,7 @@ class SurfaceService:
             self.settings.limits.rows_queued,
             self._stage_timings,
             self._expect,
+            clock=self.clock,
             recorder=self._journal,
         )
         for index, (site, radar) in enumerate(zip(self.radars, self.settings.radars, strict=True)):
@@ -114,7 +117,8 @@ class SurfaceService:
             chain.warm()
             if resume:
                 self._keeper.take_up(chain)
-            worker = RadarWorker(site, chain, self.settings.limits.blocks_queued, self._surface.offer)
+            record = self._video_recorder()
+            worker = RadarWorker(site, chain, self.settings.limits.blocks_queued, self._surface.offer, record)
             self._switches[site.id] = FrontEndSwitch(
                 worker, index, ground, self._compiler, partial(self._parts_changed, site.id)
             )
@@ -205,6 +209,12 @@ class SurfaceService:
         """Set how a runway is used."""
         state: RunwayState = self._carried_out(SetRunway(runway, open, in_use, visibility), runway)
         return state
+
+    def _video_recorder(self) -> Callable[[RadarChain, Sweeps], None]:
+        """What records the raw sweeps of one radar; nothing does where they are not wanted."""
+        if self._journal is None or not self.settings.journal.sweeps:
+            return lambda _chain, _block: None
+        return VideoRecorder(self._journal.writer, self.clock.now).before
 
     def _parts_changed(self, radar: str, parts: dict[str, Any]) -> None:
         """For those who read the journal: the engine itself does not mind."""

@@ -14,46 +14,54 @@ if TYPE_CHECKING:
     from app.settings import RadarSettings, Settings
 
 
+File = Annotated[
+    Path,
+    typer.Argument(
+        help="A journal (.mcap, or the folder of one), or radar video: .npz (scans, t), a folder of polar PNGs with a"
+        " YAML, .pcap, .pcapng."
+    ),
+]
+Headless = Annotated[
+    bool, typer.Option("--headless", help="Serve and send nothing: print what the engine or the detector makes of it.")
+]
+Speed = Annotated[float, typer.Option(min=0.01, max=1000, help="So many times the recorded pace.")]
+Verify = Annotated[
+    bool, typer.Option("--verify", help="Journal, with --headless: compare every bit with what was recorded.")
+]
+From = Annotated[str | None, typer.Option("--from", metavar="T", help="Journal: not before (ISO 8601, s, or +s).")]
+Until = Annotated[str | None, typer.Option("--until", metavar="T", help="Journal: not after, in the same forms.")]
+Change = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Journal: as in parts.lifecycle=m_of_n.")
+]
+HttpPort = Annotated[int, typer.Option("--http-port", min=0, max=65535, help="Journal: where displays are served.")]
+Radar = Annotated[str | None, typer.Option(help="Video: the radar of the settings it stands for; the first if none.")]
+To = Annotated[str | None, typer.Option(help="Video: udp://host:port; the radar's own port on this machine if none.")]
+Loop = Annotated[bool, typer.Option("--loop", help="Video: begin again at the end.")]
+Port = Annotated[int | None, typer.Option(min=1, max=65535, help="Video: take only this UDP port of a capture.")]
+SettingsFile = Annotated[
+    Path | None, typer.Option("--settings", "-s", envvar="AIRSIDE_SETTINGS", help="Video: settings of the service.")
+]
+
+
 def register(app: typer.Typer) -> None:
     """Add the command."""
     app.command()(replay)
 
 
 def replay(
-    file: Annotated[
-        Path,
-        typer.Argument(
-            help="A journal (.mcap, or the folder of one), or radar video: .npz (scans, t), a folder of polar PNGs with a"
-            " YAML, .pcap or .pcapng."
-        ),
-    ],
-    radar: Annotated[
-        str | None, typer.Option(help="Which radar of the settings it stands in for; the first if none.")
-    ] = None,
-    speed: Annotated[float, typer.Option(min=0.01, max=1000, help="So many times the recorded pace.")] = 1.0,
-    to: Annotated[
-        str | None, typer.Option(help="udp://host:port; the radar's own port on this machine if none.")
-    ] = None,
-    headless: Annotated[
-        bool,
-        typer.Option("--headless", help="Serve and send nothing: print what the engine or the detector makes of it."),
-    ] = False,
-    loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end.")] = False,
-    port: Annotated[int | None, typer.Option(min=1, max=65535, help="Take only this UDP port of a capture.")] = None,
-    verify: Annotated[
-        bool, typer.Option("--verify", help="Journal: compare every bit with what was recorded (with --headless).")
-    ] = False,
-    begin: Annotated[str | None, typer.Option("--from", help="Journal: not before, UTC, ISO 8601, s or +s.")] = None,
-    until: Annotated[str | None, typer.Option("--until", help="Journal: not after, in the same forms.")] = None,
-    change: Annotated[
-        list[str] | None, typer.Option("--set", help="Journal: another setting, as in parts.lifecycle=m_of_n.")
-    ] = None,
-    http_port: Annotated[
-        int, typer.Option("--http-port", min=0, help="Journal: where the displays are served.")
-    ] = 8000,
-    settings: Annotated[
-        Path | None, typer.Option("--settings", "-s", envvar="AIRSIDE_SETTINGS", help="Settings of the service.")
-    ] = None,
+    file: File,
+    headless: Headless = False,
+    speed: Speed = 1.0,
+    verify: Verify = False,
+    begin: From = None,
+    until: Until = None,
+    change: Change = None,
+    http_port: HttpPort = 8000,
+    radar: Radar = None,
+    to: To = None,
+    loop: Loop = False,
+    port: Port = None,
+    settings: SettingsFile = None,
 ) -> None:
     """Replay a journal, or send recorded radar video to a running service.
 
@@ -69,29 +77,45 @@ def replay(
     from rich.console import Console
 
     from app.console import fail
-    from app.contract import Refused
-    from app.ingest.recordings import open_recording
     from app.replay.command import is_journal
-    from app.settings import SettingsError, load
 
     console = Console()
     if is_journal(file):
         _replay_journal(console, file, speed, headless, verify, (begin, until), tuple(change or ()), http_port)
-        return
-    if verify or begin or until or change:
+    elif verify or begin or until or change:
         raise fail(f"{file}: --verify, --from, --until and --set are for journals (.mcap)")
+    else:
+        _replay_video(console, file, speed, headless, (radar, to), loop, port, settings)
+
+
+def _replay_video(
+    console: Console,
+    file: Path,
+    speed: float,
+    headless: bool,
+    destination: tuple[str | None, str | None],
+    loop: bool,
+    port: int | None,
+    settings: Path | None,
+) -> None:
+    from app.console import fail
+    from app.contract import Refused
+    from app.ingest.recordings import open_recording
+    from app.settings import SettingsError, load
+
     try:
         recording = open_recording(file, port=port)
         _describe(console, recording)
         loaded = load(settings)
         if headless:
             _print_plots(console, recording, loaded)
-        else:
-            address, chosen = _destination(loaded, radar, to)
-            if chosen is not None and to is None:
-                _must_fit(recording, chosen)
-            interface = chosen.udp.interface if chosen is not None and chosen.udp is not None else "0.0.0.0"
-            _send(console, recording, address, interface, speed, loop)
+            return
+        radar, to = destination
+        address, chosen = _destination(loaded, radar, to)
+        if chosen is not None and to is None:
+            _must_fit(recording, chosen)
+        interface = chosen.udp.interface if chosen is not None and chosen.udp is not None else "0.0.0.0"
+        _send(console, recording, address, interface, speed, loop)
     except (Refused, SettingsError, OSError) as error:
         raise fail(str(error)) from error
     except KeyboardInterrupt:

@@ -8,11 +8,13 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
 
 from app.journal.names import JournalError, journal_files
 from app.journal.reader import Journal, open_journal
 from app.journal.recorder import versions
 from app.journal.times import moment
+from app.replay.compare import compare
 from app.replay.verify import Verification, told, verify
 from pipeline.tables import Tracks
 
@@ -60,12 +62,33 @@ class JournalReplay:
         return 1
 
     def compare(self) -> int:
-        """Print what would have been different with the settings asked for; without any, what the journal holds."""
-        raise NotImplementedError
+        """Print what would have been different with the settings asked for; exit status 0."""
+        with self._progress("replaying") as hear:
+            made = compare(self.journal, self.change, self.since, self.until, hear)
+        title = f"{made.pictures} pictures, {' '.join(self.change) or 'the recorded settings'}"
+        table = Table(title=title, title_justify="left")
+        table.add_column("")
+        table.add_column("recorded", justify="right")
+        table.add_column("replayed", justify="right")
+        table.add_column("")
+        for row in made.figures():
+            table.add_row(row.name, f"{row.recorded:.4g}", f"{row.replayed:.4g}", row.unit)
+        self.console.print(table)
+        for title, alerts in zip(("only recorded", "only replayed"), made.alerts(), strict=True):
+            for one in alerts:
+                self.console.print(
+                    f"{title}: {told(one.time)} {one.stage} {one.rule} {one.runway} {', '.join(one.targets)}",
+                    highlight=False,
+                )
+        if not any(made.alerts()):
+            self.console.print("the same alerts")
+        return 0
 
     def serve(self, port: int, speed: float) -> int:
         """Serve the displays with the picture of the journal, until interrupted."""
-        raise NotImplementedError
+        from app.replay.serving import serve_journal
+
+        return serve_journal(self.console, self.journal, self.change, (self.since, self.until), port, speed)
 
     def _tell(self, found: Verification) -> None:
         span = "" if found.first is None or found.last is None else f", {told(found.first)} to {told(found.last)}"
@@ -78,9 +101,8 @@ class JournalReplay:
         if found.failures:
             self.console.print(f"{found.failures} inputs that the engine could not take, then as now")
         here = versions()
-        other = [
-            f"{name} {had} then, {here.get(name)} now" for name, had in found.versions.items() if here.get(name) != had
-        ]
+        then = found.versions.items()
+        other = [f"{name} {had} then, {here.get(name)} now" for name, had in then if here.get(name) != had]
         if other:
             self.console.print(f"[yellow]not the same versions: {'; '.join(other)}[/yellow]", highlight=False)
 

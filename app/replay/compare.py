@@ -8,8 +8,7 @@ from app.journal.names import JournalError
 from app.journal.reader import Journal, Record
 from app.replay.recorded import RecordedRun, changed
 from app.replay.verify import ReplayEngine
-from app.replay.video import SWEEPS
-from pipeline.engine_records import SNAPSHOT
+from pipeline.engine_records import SNAPSHOT, SWEEPS
 from pipeline.lab.measure.compare_pictures import PictureComparison
 
 

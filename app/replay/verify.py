@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 
 from app.journal.names import GAP, SNAPSHOT, JournalError
 from app.journal.reader import Journal, Record
 from app.replay.recorded import RecordedRun, recorded_run
+from app.replay.video import VideoReplay
 from pipeline.engine import SurfaceEngine
 from pipeline.engine_records import CODEC, INPUT, OUTPUT, Shown, shown
 from pipeline.inputs import Envelope
-from pipeline.tables import Tracks
+from pipeline.tables import SectorPlots, Tracks
 from pipeline.values import first_difference
 
 log = logging.getLogger(__name__)
@@ -44,6 +45,7 @@ class Verification:
     pictures: int = 0
     changes: int = 0
     snapshots: int = 0
+    sectors: int = 0
     runs: int = 0
     gaps: int = 0
     failures: int = 0
@@ -59,20 +61,29 @@ class Verification:
 
 
 class ReplayEngine:
-    """The engine of a journal, fed record by record.
+    """The engine of a journal, fed record by record, and the chains of its radars where raw sweeps were recorded.
 
-    run_of: gives the run of an id, for other settings than the recorded ones. compare: at every snapshot after the
-    first, compare the engine's state with it and stop at a difference; without it such snapshots are passed over.
+    change: gives the run that is to be replayed for a recorded one. own: verbs of the radars' chains that take their
+    parts from the settings; the engine is then given the plots of these chains in place of the recorded ones.
     """
 
-    def __init__(self, journal: Journal, change: Callable[[RecordedRun], RecordedRun] = lambda run: run) -> None:
+    def __init__(
+        self,
+        journal: Journal,
+        change: Callable[[RecordedRun], RecordedRun] = lambda run: run,
+        own: frozenset[str] = frozenset(),
+    ) -> None:
         self.journal = journal
+        self.video: VideoReplay | None = None
+        self._own = own
         self.engine: SurfaceEngine | None = None
         self.run: RecordedRun | None = None
         self.counts = Verification()
         self._change = change
         self._id = ""
         self._sequence: int | None = None
+        self.detection_difference: str | None = None
+        """Where the plots of a chain were not those recorded."""
         self._lost = True
         """No state to go on from: at the begin, and after a gap, up to the next snapshot."""
 
@@ -95,6 +106,8 @@ class ReplayEngine:
             if record.topic == INPUT and not self._lost:
                 waiting = self._step(record)
             elif record.topic not in (INPUT, OUTPUT):
+                if self.video is not None:
+                    self.video.take(record)
                 yield record
         if waiting is not None:
             yield Replayed(waiting[0], waiting[1], None, waiting[2], None, complete=False)
@@ -122,6 +135,18 @@ class ReplayEngine:
         if record.topic == GAP:
             self._lose()
 
+    def _detected_again(self, record: Record, envelope: Envelope, recorded: SectorPlots) -> Envelope:
+        """The sector as the chain makes it of the recorded sweeps, where these are there."""
+        made = self.video.sector(recorded) if self.video is not None else None
+        if made is None:
+            return envelope
+        self.counts.sectors += 1
+        if self._own:
+            return replace(envelope, body=made)
+        if CODEC.encode(made) != CODEC.encode(recorded):
+            self.detection_difference = f"plots at {told(record.time)}: {first_difference(recorded, made)}"
+        return envelope
+
     def _lose(self) -> None:
         if not self._lost:
             self.counts.gaps += 1
@@ -132,6 +157,7 @@ class ReplayEngine:
         attached = next((got for one in self.journal.files if (got := one.attachments(id))), {})
         self.run = self._change(recorded_run(attached, self.journal.name))
         self.engine = self.run.engine()
+        self.video = VideoReplay(self.run, self._own)
         self.counts.runs += 1
         self.counts.versions = self.run.versions
 
@@ -142,6 +168,8 @@ class ReplayEngine:
         except ValueError as error:
             raise JournalError(f"{self.journal.name}: the input at {told(record.time)}: {error}") from error
         self.counts.inputs += 1
+        if isinstance(envelope.body, SectorPlots):
+            envelope = self._detected_again(record, envelope, envelope.body)
         try:
             made = shown(self.engine.step(envelope))
         except Exception:
@@ -169,7 +197,7 @@ def verify(
             if one.topic == SNAPSHOT:
                 counts.difference = _at_snapshot(replay, one)
         else:
-            counts.difference = _compared(one, counts)
+            counts.difference = replay.detection_difference or _compared(one, counts)
             counts.first = one.record.time if counts.first is None else counts.first
             counts.last = one.record.time
             progress(one.record.time)

@@ -16,8 +16,6 @@ from pipeline.engine_records import CHAIN, CODEC, SWEEPS, ChainBlock, ChainState
 from pipeline.state import StateError
 from pipeline.tables import SectorPlots, TableError
 
-__all__ = ["SWEEPS", "VideoReplay"]
-
 log = logging.getLogger(__name__)
 
 MOST_WAITING = 4096

@@ -43,7 +43,7 @@ TOP = ("parts", "catalogue", "chain", "engine", "engine_records")
 ROOMS |= dict.fromkeys(TOP, frozenset(ROOMS) | set(TOP))
 ROOMS["lab"] = frozenset(ROOMS)
 
-LABORATORY_IN_THE_SHELL = ("app/bench/", "app/cli/", "app/demo/", "app/evaluate/")
+LABORATORY_IN_THE_SHELL = ("app/bench/", "app/cli/", "app/demo/", "app/evaluate/", "app/replay/compare.py")
 """Commands and the demonstration; what serves a real airport runs without the laboratory."""
 
 CORE, SHELL = sources("pipeline"), sources("app")

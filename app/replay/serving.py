@@ -1,0 +1,1 @@
+"""Serves the displays with the picture of a journal."""
