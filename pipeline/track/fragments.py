@@ -5,29 +5,32 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from pipeline.airport.model import SurfaceKind
+from pipeline.group.fragments import AIRCRAFT_HALF_EXTENT, FAST, Tracks, find_fragments, grow_extent
 from pipeline.tables import TargetClass, TrackPhase
-from pipeline.tables.arrays import Array, Floats
-from pipeline.track.core import Core, end
+from pipeline.tables.arrays import Floats
+from pipeline.track.core import Core, end_tracks
 
-BODY = 21.0
-"""Half the length, and half the span, of an aircraft of unknown size, and how far off its centre may be; metres."""
+MERGED_POSITION_SD = 0.1
+"""Standard deviation of the middle of a joined target, as a fraction of the distance of its two fragments."""
 
-FAST = 20.0
-"""m/s, above which nothing else moves within the body of an aircraft."""
+RANK_NAMED, RANK_AIRCRAFT, RANK_JOINED = 4.0, 2.0, 1.0
+"""Which of two tracks goes on: one with an address before one without, then an aircraft, then one that already holds
+fragments. Not the larger, for extents change with every turn. Each outweighs all that follow it."""
 
-LONGEST = 75.0
-"""No aircraft is longer; metres."""
+EXTENT_COLUMNS = (
+    "length", "width", "heading", "axis_bearing", "moving", "extent_count", "category", "least_half_extent",
+)  # fmt: skip
+"""What a track knows of the size and direction of its target."""
 
 
-def join_parts(core: Core) -> None:
-    """Small unnamed tracks that stay within the body of an aircraft, or within one body of each other off runways and
-    taxiways without ever moving, become one track with the extent of all.
+def join_fragments(core: Core) -> None:
+    """Make one track, with the extent of all, of an aircraft and the tracks without an address that stay within its
+    extent, and of tracks that stay close together off runways and taxiways without ever moving.
     """
     table, n = core.table, core.table.n
-    table.body[:n][table.moving[:n] & (table.category[:n] != TargetClass.AIRCRAFT)] = 0.0
+    table.least_half_extent[:n][table.moving[:n] & (table.category[:n] != TargetClass.AIRCRAFT)] = 0.0
     alive = np.flatnonzero(table.phase[:n] != TrackPhase.TENTATIVE)
     if len(alive) < 2:
         return
@@ -37,85 +40,75 @@ def join_parts(core: Core) -> None:
     aircraft = table.category[alive] == TargetClass.AIRCRAFT
     kind = core.zones.kind(state[:, 0], state[:, 1])
     on_apron = (kind != SurfaceKind.RUNWAY) & (kind != SurfaceKind.TAXIWAY)
-    still = on_apron & ~table.moved[alive] & ~named
-    size = core.extents(alive)
-    # not by extent, which changes with every turn; among equals the older goes on
-    rank = 4.0 * named + 2.0 * aircraft + 1.0 * (table.body[alive] > 0)
-    whole = np.full(len(alive), -1, np.int64)
-    order = np.argsort(state[:, 0], kind="stable")
-    seen = np.fmax(np.nan_to_num(table.length[alive]), np.nan_to_num(table.width[alive]))
-    _parts(
-        order, state, covariance, size, seen, named, aircraft, on_apron, still, rank, core.settings.absorb_margin, whole
+    tracks = Tracks(
+        state=state,
+        covariance=covariance,
+        extent=core.extents(alive),
+        longest_side=np.fmax(np.nan_to_num(table.length[alive]), np.nan_to_num(table.width[alive])),
+        named=named,
+        aircraft=aircraft,
+        on_apron=on_apron,
+        standing=on_apron & ~table.moved[alive] & ~named,
+        rank=RANK_NAMED * named + RANK_AIRCRAFT * aircraft + RANK_JOINED * (table.least_half_extent[alive] > 0),
     )
-    table.part[alive] = np.where(whole >= 0, table.part[alive] + 1, 0)
+    whole = find_fragments(tracks, core.settings.grouping.absorb_margin)
+    table.fragment_checks[alive] = np.where(whole >= 0, table.fragment_checks[alive] + 1, 0)
     gone = np.zeros(n, np.bool_)
     fast = np.hypot(state[whole, 2], state[whole, 3]) > FAST
-    patience = np.where(fast, 0, core.settings.merge_after)
-    for junior in np.flatnonzero((whole >= 0) & (table.part[alive] > patience)):
-        senior = alive[whole[junior]]
-        if not gone[senior] and not gone[alive[junior]]:
-            hopped = bool(on_apron[whole[junior]] and not named[whole[junior]])
-            _cover(core, int(senior), int(alive[junior]), state[whole[junior]], state[junior], hopped)
-            body = table.body[senior]
-            absorb(core, int(senior), int(alive[junior]))
-            table.body[senior] = body
-            gone[alive[junior]] = True
-    core.count("parts_joined", int(gone.sum()))
-    end(core, gone)
+    patience = np.where(fast, 0, core.settings.grouping.merge_after)
+    for fragment in np.flatnonzero((whole >= 0) & (table.fragment_checks[alive] > patience)):
+        senior, junior = alive[whole[fragment]], alive[fragment]
+        if not gone[senior] and not gone[junior]:
+            parked = bool(on_apron[whole[fragment]] and not named[whole[fragment]])
+            _cover(core, int(senior), int(junior), state[fragment, :2] - state[whole[fragment], :2], parked)
+            least = table.least_half_extent[senior]
+            absorb(core, int(senior), int(junior))
+            table.least_half_extent[senior] = least
+            gone[junior] = True
+    core.count("fragments_joined", int(gone.sum()))
+    end_tracks(core, gone)
 
 
-def _cover(core: Core, whole: int, part: int, here: Floats, there: Floats, hopped: bool) -> None:
-    """The extent of `whole` grows over `part`; what stands moves to the middle of both.
+def _cover(core: Core, whole: int, fragment: int, away: Floats, parked: bool) -> None:
+    """Grow the extent of the track `whole` over that of `fragment`, which lies `away` (east, north) m from it.
 
-    hopped: it has no motion but that from part to part, so it has no heading.
+    parked: its only motion was that from fragment to fragment, so it has no heading, and moves to the middle of both.
     """
     table = core.table
-    away = there[:2] - here[:2]
     distance = float(np.hypot(away[0], away[1]))
-    own = core.extents(np.array([whole, part]))
+    own = core.extents(np.array([whole, fragment]))
     direction = table.heading[whole]
     if not math.isfinite(direction):
         if distance > own[0, 0]:
-            table.axis[whole] = math.atan2(away[0], away[1]) % math.pi
-        direction = table.axis[whole] if math.isfinite(table.axis[whole]) else 0.0
-    along = abs(away[0] * math.sin(direction) + away[1] * math.cos(direction))
-    across = abs(away[0] * math.cos(direction) - away[1] * math.sin(direction))
-    grown = []
-    for own_side, other, apart in ((own[0, 0], own[1, 0], along), (own[0, 1], own[1, 1], across)):
-        grown.append(min(max(own_side, own_side / 2 + apart + other / 2), LONGEST))
-    if hopped:
-        # halfway by how far the extent grew, so that the far edges of both stay where they are
-        share = (
-            0.5 * (grown[0] - own[0, 0]) / max(along, 1.0)
-            if along >= across
-            else 0.5 * (grown[1] - own[0, 1]) / max(across, 1.0)
-        )
-        table.state[whole, :2] += min(share, 1.0) * away
-        table.covariance[whole, 0, 0] += (0.1 * distance) ** 2
-        table.covariance[whole, 1, 1] += (0.1 * distance) ** 2
-    if hopped:
+            table.axis_bearing[whole] = math.atan2(away[0], away[1]) % math.pi
+        direction = table.axis_bearing[whole] if math.isfinite(table.axis_bearing[whole]) else 0.0
+    grown = grow_extent(own[0], own[1], away, direction)
+    if parked:
+        table.state[whole, :2] += grown.shift * away
+        table.covariance[whole, 0, 0] += (MERGED_POSITION_SD * distance) ** 2
+        table.covariance[whole, 1, 1] += (MERGED_POSITION_SD * distance) ** 2
         table.moved[whole] = table.moving[whole] = False
         table.heading[whole] = np.nan
         table.birthplace[whole] = table.state[whole, :2]
-    table.length[whole], table.width[whole] = grown
-    table.body[whole] = max(BODY, 0.5 * max(grown))
-    table.shapes[whole] = max(int(table.shapes[whole]), 1)
+    table.length[whole], table.width[whole] = grown.length, grown.width
+    table.least_half_extent[whole] = max(AIRCRAFT_HALF_EXTENT, 0.5 * max(grown.length, grown.width))
+    table.extent_count[whole] = max(int(table.extent_count[whole]), 1)
 
 
 def absorb(core: Core, senior: int, junior: int) -> None:
-    """The senior takes the better state, and name and extent where it has none."""
+    """The track `senior` takes over from `junior` the better state, and address and extent where it has none."""
     table = core.table
     if np.trace(table.covariance[junior, :2, :2]) < np.trace(table.covariance[senior, :2, :2]) or (
         table.radar_time[junior] > table.radar_time[senior]
     ):
-        for name in ("time", "state", "covariance", "one_point"):
+        for name in ("time", "state", "covariance", "velocity_unknown"):
             getattr(table, name)[senior] = getattr(table, name)[junior]
         table.looked[:, senior] = table.looked[:, junior]
-    if table.shapes[junior] > table.shapes[senior]:
-        for name in ("length", "width", "heading", "axis", "moving", "shapes", "category", "body"):
+    if table.extent_count[junior] > table.extent_count[senior]:
+        for name in EXTENT_COLUMNS:
             getattr(table, name)[senior] = getattr(table, name)[junior]
     if table.address[senior] == "" and table.address[junior] != "":
-        for name in ("address", "callsign", "claimed", "altitude", "on_ground", "simulated", "doubt"):
+        for name in ("address", "callsign", "claimed", "altitude", "on_ground", "simulated", "misfit_reports"):
             getattr(table, name)[senior] = getattr(table, name)[junior]
         if table.claimed[senior]:
             table.category[senior] = table.claimed[senior]
@@ -124,37 +117,3 @@ def absorb(core: Core, senior: int, junior: int) -> None:
     table.hits[senior] += table.hits[junior]
     table.misses[senior] = min(table.misses[senior], table.misses[junior])
     table.moved[senior] |= table.moved[junior]
-
-
-@njit(nogil=True, cache=True)
-def _parts(
-    order: Array, state: Floats, cov: Floats, extent: Floats, seen: Floats, named: Array, aircraft: Array,
-    apron: Array, still: Array, rank: Floats, margin: float, whole: Array,
-) -> None:  # fmt: skip
-    """For each track the one it is a part of, or -1. order: rows by east."""
-    for a in range(len(order)):
-        for b in range(a + 1, len(order)):
-            i, j = order[a], order[b]
-            e, n = state[j, 0] - state[i, 0], state[j, 1] - state[i, 1]
-            if e > 0.5 * LONGEST + margin:
-                break
-            if (rank[j], -j) > (rank[i], -i):
-                i, j = j, i
-            if named[j] or not (aircraft[i] or (still[i] and still[j])):
-                continue
-            reach = max(0.5 * max(extent[i, 0], extent[i, 1]), BODY) + margin
-            apart = math.sqrt(e * e + n * n)
-            if apart > reach or (seen[j] > 25.0 and apart > BODY):
-                continue
-            faster = (state[i, 2] - state[j, 2]) ** 2 + (state[i, 3] - state[j, 3]) ** 2
-            loose = cov[i, 2, 2] + cov[i, 3, 3] + cov[j, 2, 2] + cov[j, 3, 3]
-            # on the apron a track that hops from part to part seems to move
-            slack = 4.0 if apron[i] and apron[j] else 1.0
-            pace = state[i, 2] ** 2 + state[i, 3] ** 2
-            # two of them cannot fly or roll so close; new tracks have wild speeds
-            if pace > FAST**2:
-                slack += 0.02 * pace
-            if faster > 5.0 * (loose + slack):
-                continue
-            if whole[j] < 0 or (rank[i], -i) > (rank[whole[j]], -whole[j]):
-                whole[j] = i
