@@ -237,6 +237,13 @@ class Journal:
                     return seconds(at)
         return None
 
+    def first_snapshot(self) -> float:
+        """UTC s of the first snapshot, before which nothing can be replayed. Raises JournalError when there is none."""
+        for file in self.files:
+            for at, _ in file.snapshots():
+                return at
+        raise JournalError(f"{self.name}: no snapshot in it, so that nothing can be replayed")
+
     def topics(self) -> frozenset[str]:
         """The topics of which there are records."""
         used = {(file, channel) for file in self.files for chunk in file.chunks for channel, _, _ in chunk.messages}

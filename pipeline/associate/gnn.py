@@ -16,7 +16,7 @@ from pipeline.tables.arrays import Array, Floats
 
 @dataclass(frozen=True)
 class GlobalNearestNeighbour:
-    """Pairs inside the gate cost d^2 + ln|S| (+ penalty) less the worth of explaining a measurement; a miss costs 0.
+    """Pairs inside the gate cost d^2 + ln|S| (+ penalty) less `log_likelihood_ratio`; a miss costs 0.
 
     gate: bound of the squared Mahalanobis distance (13.8 holds 99.9 % of two dimensions). max_gate_m: no pair is
     farther apart. extent_sd: the centroid of an extended target wanders; this part of its length and width is added
@@ -41,8 +41,11 @@ class GlobalNearestNeighbour:
             raise ValueError("extent_sd must lie between 0 and 1")
 
     @property
-    def worth(self) -> float:
-        """What a pair gains against leaving the track missed and the measurement unexplained, in -2 log units."""
+    def log_likelihood_ratio(self) -> float:
+        """Twice the logarithm of how much likelier a perfect pair is than a missed track and a new measurement.
+
+        The terms that do not depend on the pair; costs are -2 log likelihoods, hence twice.
+        """
         return -2.0 * math.log(2 * math.pi * self.new_density * (1 - self.detection) / self.detection)
 
     def __call__(self, tracks: Expected, measured: Measured) -> Assignment:
@@ -57,11 +60,11 @@ class GlobalNearestNeighbour:
             tracks.time, tracks.state, tracks.covariance, tracks.window, tracks.extent,
             measured.time, measured.position, measured.noise, self.gate, self.max_gate_m, self.extent_sd,
         )  # fmt: skip
-        start, order, grid = _grid(measured.position, self.max_gate_m / 3)
+        start, order, grid = _grid(measured.position, self.max_gate_m / CELLS_PER_GATE)
         pairs = _gate(*arguments, start, order, grid, first, np.empty(0, np.int32), np.empty(0), np.empty(0), False)
         pair, squared, log_det = np.empty(pairs, np.int32), np.empty(pairs), np.empty(pairs)
         _gate(*arguments, start, order, grid, first, pair, squared, log_det, True)
-        cost = squared + log_det - self.worth + np.repeat(tracks.penalty, np.diff(first))
+        cost = squared + log_det - self.log_likelihood_ratio + np.repeat(tracks.penalty, np.diff(first))
         assign_sparse(first, pair, cost, m, chosen)
         _taken(first, pair, squared, chosen, distance)
         return Assignment(chosen, distance, first, pair, cost)
@@ -69,12 +72,23 @@ class GlobalNearestNeighbour:
 
 PART = GlobalNearestNeighbour
 
+CELLS_PER_GATE = 3
+"""Cells of the search grid across half a gate: fewer compare pairs that are too far apart, more visit empty cells."""
+
+MOST_CELLS, MOST_CELLS_A_SIDE = 16384, 4096
+"""Of the search grid, so that one stray measurement does not make it large; 64 kB."""
+
 
 def _grid(position: Floats, cell: float) -> tuple[Array, Array, Floats]:
     """Measurements sorted into square cells: first row of each cell (CSR), the rows, (west, south, cell, nx, ny)."""
     west, south = position.min(axis=0)
     wide, high = position.max(axis=0) - (west, south)
-    cell = max(cell, math.sqrt(max(wide, 1.0) * max(high, 1.0) / 16384), wide / 4096, high / 4096)
+    cell = max(
+        cell,
+        math.sqrt(max(wide, 1.0) * max(high, 1.0) / MOST_CELLS),
+        wide / MOST_CELLS_A_SIDE,
+        high / MOST_CELLS_A_SIDE,
+    )
     nx, ny = int(wide / cell) + 1, int(high / cell) + 1
     start, order = np.zeros(nx * ny + 1, np.int32), np.empty(len(position), np.int32)
     _sort_cells(position, west, south, cell, nx, start, order)

@@ -14,6 +14,22 @@ from pipeline.tables.arrays import Array, Floats
 REACH = 0.5
 """A false plot strays by about this many cells of the grid, so it is shared among four."""
 
+CELL_M = 12.0
+"""Side of a cell of the grid: some resolution cells of a surface radar, so that clutter fills it in a few minutes."""
+
+MEMORY_TURNS = 60.0
+"""Turns over which the average reaches: clutter changes with rain and with what is parked, in minutes. Tied to a
+one-second antenna."""
+
+MOST_CELLS = 1024
+"""Cells a side at most: 8 MB."""
+
+FIRST_TURNS = 4.0
+"""Turns without false plots that the first average begins with, so that one false plot is not yet a habit."""
+
+LARGEST_SCALE = 1e9
+"""At which the scale is taken into all cells; far below where a double loses digits."""
+
 
 @dataclass(slots=True, eq=False)
 class FalsePlots:
@@ -33,10 +49,10 @@ class FalsePlots:
     closed: int = 0
 
     @classmethod
-    def around(cls, site: RadarSite, step: float = 12.0, memory: float = 60.0) -> FalsePlots:
-        """An empty map of all that a radar covers; `step` grows where there would be more than 1024 cells a side."""
+    def around(cls, site: RadarSite, step: float = CELL_M, memory: float = MEMORY_TURNS) -> FalsePlots:
+        """An empty map of all that a radar covers; `step` grows where there would be more than MOST_CELLS a side."""
         reach = site.video.first_range_m + site.video.ranges * site.video.range_step_m + 2 * step
-        step = max(step, 2 * reach / 1024)
+        step = max(step, 2 * reach / MOST_CELLS)
         cells = math.ceil(2 * reach / step) + 1
         return cls(site.east - reach, site.north - reach, step, memory, np.zeros((cells, cells)))
 
@@ -49,13 +65,13 @@ class FalsePlots:
             self.closed += azimuths
             self.turns += 1
             self.scale /= 1.0 - self._gain
-        if self.scale > 1e9:
+        if self.scale > LARGEST_SCALE:
             self.rate /= self.scale
             self.scale = 1.0
 
     @property
     def _gain(self) -> float:
-        return max(1.0 / self.memory, 1.0 / (self.turns + 4.0))
+        return max(1.0 / self.memory, 1.0 / (self.turns + FIRST_TURNS))
 
     def learn(self, place: Floats, plots: Floats) -> None:
         """At these places (n, 2) there were so many false plots (n,)."""

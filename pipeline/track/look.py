@@ -13,6 +13,42 @@ from pipeline.tables.arrays import Array, Floats
 
 TWO_PI = 2 * math.pi
 
+LEAST_TURN, MOST_TURNS = 64, 4
+"""A sector of less than this fraction of a turn, or of more turns, does not teach the period: too short to time, or the
+feed was interrupted."""
+
+PERIOD_FACTOR = 4.0
+"""A measured period more than so many times longer or shorter than the radar's nominal one is a fault of its times."""
+
+PERIOD_GAIN = 0.25
+"""Fraction of a new measurement of the period that is taken per turn: antennas change speed in wind within some
+turns."""
+
+HELD_BACK_TURNS = 0.5
+"""Turns by which the newest sweep may be ahead of the row that is closed: a large echo that is open holds it back."""
+
+AHEAD_TURNS = 0.1
+"""Turns by which plots may say that the antenna is ahead of the newest sweep; their times are those of centroids."""
+
+ACCELERATION_SPREAD = 4.0
+"""m^2/s^3, times the cube of the time ahead: variance of the position of a target that accelerates at random, 2 m in
+the first second. Only tells when all that a gate can hold has been delivered."""
+
+EXTENT_VARIANCE = 0.1
+"""Variance of a centroid, as a fraction of the squared length of its target: a standard deviation of a third of it."""
+
+RANGE_MARGIN_CELLS = 2.0
+"""Range cells by which the gate reaches further: an echo is wider than its target by about one at either end."""
+
+MOST_GUARD = 0.25
+"""rad to both sides that a look waits for at most: a loose track near the radar is not worth a long delay."""
+
+LEAST_DISTANCE = 1.0
+"""m; a target nearer to the radar is taken to be this far when its gate is turned into an angle."""
+
+MARGIN_ROWS = 1.0
+"""Rows by which the gate is wider, for azimuths are rounded down to rows."""
+
 
 @dataclass(slots=True)
 class RadarClock:
@@ -30,19 +66,20 @@ class RadarClock:
     def heard(self, closed_to: int, newest: float, azimuths: int, nominal: float) -> None:
         """A sector was closed; the period is learnt from what passed since the last."""
         rows, passed = closed_to - self.closed_to, newest - self.newest
-        if math.isfinite(passed) and passed > 0 and azimuths // 64 <= rows <= 4 * azimuths:
+        if math.isfinite(passed) and passed > 0 and azimuths // LEAST_TURN <= rows <= MOST_TURNS * azimuths:
             turn = passed * azimuths / rows
-            if nominal / 4 <= turn <= nominal * 4:
-                self.period += (turn - self.period) * min(1.0, 0.25 * rows / azimuths)
+            if nominal / PERIOD_FACTOR <= turn <= nominal * PERIOD_FACTOR:
+                self.period += (turn - self.period) * min(1.0, PERIOD_GAIN * rows / azimuths)
         due = min(self.time + rows * self.period / azimuths, newest)
-        self.time = due if due > newest - 0.5 * self.period else newest
+        self.time = due if due > newest - HELD_BACK_TURNS * self.period else newest
         self.closed_to, self.newest = closed_to, newest
 
     def set_by(self, rows: Array, times: Floats, azimuths: int) -> None:
         """Plots tell at what time the antenna was at their row."""
         if len(rows):
             told = float(np.median(times + (self.closed_to - rows) * (self.period / azimuths)))
-            if self.newest - 0.5 * self.period <= told <= self.newest + 0.1 * self.period:
+            earliest = self.newest - HELD_BACK_TURNS * self.period
+            if earliest <= told <= self.newest + AHEAD_TURNS * self.period:
                 self.time = told
 
 
@@ -87,10 +124,6 @@ def plan_looks(
     return made
 
 
-MOST_GUARD = 0.25
-"""Radians to both sides that a look waits for at most: a loose track near the radar is not worth a long delay."""
-
-
 @allocating
 def _plan(
     radar: Floats, closed_to: int, time: Floats, state: Floats, cov: Floats, extent: Floats, looked: Array,
@@ -119,9 +152,10 @@ def _plan(
             dt = now - (closed_to - r) * period / azimuths - time[i]
         distance = math.sqrt(e * e + n * n)
         spread = p[0, 0] + p[1, 1] + 2 * dt * (p[0, 2] + p[1, 3]) + dt * dt * (p[2, 2] + p[3, 3])
-        spread += 4.0 * abs(dt) ** 3 + (distance * beamwidth) ** 2 + step * step + 0.1 * extent[i, 0] ** 2
-        reach = min(math.sqrt(gate * max(spread, 0.0)), max_gate) + 0.5 * extent[i, 0] + 2.0 * step
-        guard[i] = min(reach / max(distance, 1.0), MOST_GUARD) / TWO_PI * azimuths + 1.0
+        manoeuvre, centroid = ACCELERATION_SPREAD * abs(dt) ** 3, EXTENT_VARIANCE * extent[i, 0] ** 2
+        spread += manoeuvre + (distance * beamwidth) ** 2 + step * step + centroid
+        reach = min(math.sqrt(gate * max(spread, 0.0)), max_gate) + 0.5 * extent[i, 0] + RANGE_MARGIN_CELLS * step
+        guard[i] = min(reach / max(distance, LEAST_DISTANCE), MOST_GUARD) / TWO_PI * azimuths + MARGIN_ROWS
         # a scan left out is one look, not as many as turns went by
         late = int((closed_to - guard[i] - r) // azimuths)
         if late > 0:

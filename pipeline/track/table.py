@@ -19,7 +19,7 @@ _COLUMNS: dict[str, tuple[str, tuple[int, ...], Any]] = {
     "state": ("f8", (4,), 0.0),
     "covariance": ("f8", (4, 4), 0.0),
     "phase": ("u1", (), 0),
-    "one_point": ("?", (), True),
+    "velocity_unknown": ("?", (), True),
     "updated": ("f8", (), 0.0),
     "born": ("f8", (), 0.0),
     "birthplace": ("f8", (2,), 0.0),
@@ -32,23 +32,23 @@ _COLUMNS: dict[str, tuple[str, tuple[int, ...], Any]] = {
     "length": ("f8", (), np.nan),
     "width": ("f8", (), np.nan),
     "heading": ("f8", (), np.nan),
-    "axis": ("f8", (), np.nan),
+    "axis_bearing": ("f8", (), np.nan),
     "moving": ("?", (), False),
-    "shapes": ("i4", (), 0),
+    "extent_count": ("i4", (), 0),
     "altitude": ("f8", (), np.nan),
     "on_ground": ("?", (), True),
     "category": ("u1", (), 0),
     "claimed": ("u1", (), 0),
     "address": ("U6", (), ""),
     "callsign": ("U8", (), ""),
-    "doubt": ("i4", (), 0),
+    "misfit_reports": ("i4", (), 0),
     "radar_time": ("f8", (), NEVER),
     "node_time": ("f8", (), NEVER),
     "report_time": ("f8", (), NEVER),
     "simulated": ("?", (), False),
-    "twin": ("i4", (), 0),
-    "part": ("i4", (), 0),
-    "body": ("f8", (), 0.0),
+    "duplicate_checks": ("i4", (), 0),
+    "fragment_checks": ("i4", (), 0),
+    "least_half_extent": ("f8", (), 0.0),
     "radar": ("i2", (), -1),
 }
 
@@ -57,12 +57,15 @@ class TrackTable:
     """Columns of `capacity` rows of which the first `n` are alive, in order of birth.
 
     looked: (radars, capacity) int64, absolute row of each radar's last look at the track.
-    one_point: the velocity is not known yet. birthplace: where it was first seen. history: hits by look, newest in
-    bit 0. score: logarithm of how much better a target explains its plots than false plots do. axis: rad modulo pi,
-    long axis as the radar sees it. shapes: extents seen. claimed: TargetCategory of its reports. doubt: reports in a
-    row that did not fit. twin: checks in a row that found it to double another. part: checks in a row that found it to
-    be a part of another. body: m, half the size of a target that was seen in parts, 0 for others. radar: index of the
-    radar whose plot began it, -1 for another sensor.
+    velocity_unknown: one position was taken; the second gives the velocity. birthplace: m, where it was first seen.
+    moved: has come away from its birthplace for good. history: hits by look, newest in bit 0. looks: how many of its
+    bits count. score: natural logarithm of how much better a target explains its plots than false plots do.
+    axis_bearing: rad modulo pi, direction of the long axis as the radar sees it. moving: fast enough that the course
+    gives the heading. extent_count: extents taken so far. claimed: TargetCategory of its reports. misfit_reports:
+    reports in a row of its address that did not fit. duplicate_checks: checks in a row that found it to duplicate
+    another track. fragment_checks: checks in a row that found it to be a fragment of another. least_half_extent: m,
+    half the least length and width of a target seen in fragments, 0 for others. radar: index of the radar whose plot
+    began it, -1 for another sensor. radar_time, node_time, report_time: UTC s of the newest contribution.
     The other columns are those of `Tracks`.
     """
 
@@ -72,7 +75,7 @@ class TrackTable:
     state: Array
     covariance: Array
     phase: Array
-    one_point: Array
+    velocity_unknown: Array
     updated: Array
     born: Array
     birthplace: Array
@@ -85,23 +88,23 @@ class TrackTable:
     length: Array
     width: Array
     heading: Array
-    axis: Array
+    axis_bearing: Array
     moving: Array
-    shapes: Array
+    extent_count: Array
     altitude: Array
     on_ground: Array
     category: Array
     claimed: Array
     address: Array
     callsign: Array
-    doubt: Array
+    misfit_reports: Array
     radar_time: Array
     node_time: Array
     report_time: Array
     simulated: Array
-    twin: Array
-    part: Array
-    body: Array
+    duplicate_checks: Array
+    fragment_checks: Array
+    least_half_extent: Array
     radar: Array
 
     def __init__(self, capacity: int, radars: int) -> None:
@@ -148,18 +151,24 @@ class TrackTable:
         self.n, self.last_uid = n, int(saved["last_uid"])
 
 
+LAST_NUMBER = 4095
+"""The greatest track number: ASTERIX CAT010 has 12 bits for it (I010/161)."""
+
+
 @dataclass(slots=True, eq=False)
 class TrackNumbers:
-    """Numbers 1 .. 4095 given in turn, so that the longest unused comes next; those in `rest` s stay unused.
+    """Numbers 1 .. 4095 given in turn, so that the longest unused comes next.
 
-    free_at: (4096,) UTC s from which each number may be given again; infinite while it is borne.
+    rest: s for which a number stays unused after its track ended, so that a controller does not take one target for
+    another; two minutes, as 4095 numbers suffice for it. free_at: (4096,) UTC s from which each number may be given
+    again; infinite while a track bears it.
     """
 
-    LAST: ClassVar[int] = 4095
+    LAST: ClassVar[int] = LAST_NUMBER
 
     rest: float = 120.0
     next: int = 1
-    free_at: Array = field(default_factory=lambda: np.full(4096, NEVER))
+    free_at: Array = field(default_factory=lambda: np.full(LAST_NUMBER + 1, NEVER))
 
     def take(self, time: float) -> int:
         """The next free number, 0 when none is free."""

@@ -17,15 +17,16 @@ from pipeline.contracts.lifecycle import LifecyclePart
 from pipeline.sites import NodeSite, RadarSite
 from pipeline.tables import NodeEvents, Plots, SectorPlots, TargetReports, TrackPhase, Tracks
 from pipeline.tables.arrays import Array
-from pipeline.track.core import SOURCE_TIMES, Core, TrackerSettings, ZoneLookup, judge, make_core, shift_times
-from pipeline.track.housekeeping import keep_house
+from pipeline.track.core import SOURCE_TIMES, Core, ZoneLookup, make_core, shift_times, update_lifecycle
+from pipeline.track.maintenance import maintain_tracks
 from pipeline.track.node_update import take_node_events
 from pipeline.track.radar_update import PAVED, SETTLED, take_sector
 from pipeline.track.report_update import take_target_reports
+from pipeline.track.settings import TrackerSettings
 from pipeline.track.table import NEVER
 
 _SAME = ("id", "phase", "updated", "born", "hits", "misses", "altitude", "on_ground", "category", "address", "callsign")
-_SAVED = ("numbers", "clocks", "waiting", "false_plots", "undecided", "time", "judged", "checked")
+_SAVED = ("numbers", "clocks", "waiting", "false_plots", "undecided", "time", "lifecycle_time", "maintenance_time")
 
 
 class Tracker:
@@ -68,7 +69,7 @@ class Tracker:
     def sector(self, sector: SectorPlots) -> bool:
         """Take the plots of one sector: a whole turn or any part of one. False, counted, when it cannot be taken."""
         taken = take_sector(self._core, sector)
-        keep_house(self._core)
+        maintain_tracks(self._core)
         return taken
 
     def node_events(self, events: NodeEvents) -> NodeEvents:
@@ -88,15 +89,15 @@ class Tracker:
             core.count("time_backwards")
         else:
             core.time = time
-            core.judged = min(core.judged, time - 1.0)
-            keep_house(core)
+            core.lifecycle_time = min(core.lifecycle_time, time - 1.0)
+            maintain_tracks(core)
 
     def shift(self, seconds: float) -> None:
         """The clock that all times come from was set: everything remembered becomes later by `seconds`."""
         shift_times(self._core, seconds)
 
     def tracks(self, time: float | None = None) -> Tracks:
-        """The confirmed and coasting tracks worth a controller's eye, in order of birth.
+        """The confirmed and coasting tracks that are shown, in order of birth.
 
         Each stands at the time of its last measurement, coasting ones at the tracker's time; with `time`, all at it.
         Tracks by radar alone that never moved and stand off the pavement are left out unless the settings want them.
@@ -107,12 +108,12 @@ class Tracker:
         if time is not None:
             ahead = time - table.time[rows]
         state, covariance = core.filter.predict(table.state[rows], table.covariance[rows], ahead)
-        seen = self._worth_reporting(rows, state)
+        seen = self._reportable(rows, state)
         rows, ahead, state, covariance = rows[seen], ahead[seen], state[seen], covariance[seen]
         sources = np.zeros(len(rows), np.uint8)
         for source, name in SOURCE_TIMES.items():
             sources |= np.where(
-                getattr(table, name)[rows] >= core.time - core.settings.source_memory, source, 0
+                getattr(table, name)[rows] >= core.time - core.settings.reporting.source_memory, source, 0
             ).astype("u1")
         return Tracks.build(
             len(rows),
@@ -120,24 +121,24 @@ class Tracker:
             time=table.time[rows] + ahead,
             state=state,
             covariance=covariance,
-            length=np.where(table.shapes[rows] > 0, table.length[rows], np.nan),
-            width=np.where(table.shapes[rows] > 0, table.width[rows], np.nan),
-            heading=np.where(table.shapes[rows] > 0, table.heading[rows], _course(state)),
+            length=np.where(table.extent_count[rows] > 0, table.length[rows], np.nan),
+            width=np.where(table.extent_count[rows] > 0, table.width[rows], np.nan),
+            heading=np.where(table.extent_count[rows] > 0, table.heading[rows], _course(state)),
             sources=sources,
             simulated=table.simulated[rows],
             zone=core.zones.zone(state[:, 0], state[:, 1]),
             runway=core.zones.runway(state[:, 0], state[:, 1]),
         )
 
-    def _worth_reporting(self, rows: Array, state: Array) -> Array:
+    def _reportable(self, rows: Array, state: Array) -> Array:
         core, table = self._core, self._core.table
         kind = core.zones.kind(state[:, 0], state[:, 1])
         known = (table.address[rows] != "") | (table.node_time[rows] > NEVER) | (table.report_time[rows] > NEVER)
-        # what a radar has lost did not go on through a building
+        # a track that its radar has lost does not go on through a building
         lost = ~known & (table.phase[rows] == TrackPhase.COASTING) & (kind == SurfaceKind.BUILDING)
-        if core.settings.report_fixed_off_pavement:
+        if core.settings.reporting.fixed_off_pavement:
             return np.asarray(~lost)
-        large = (table.length[rows] >= core.settings.aircraft_length) & (table.shapes[rows] >= SETTLED)
+        large = (table.length[rows] >= core.settings.extent.aircraft_length) & (table.extent_count[rows] >= SETTLED)
         return np.asarray((known | table.moved[rows] | large | PAVED[kind]) & ~lost)
 
     def save(self) -> dict[str, Any]:
@@ -176,15 +177,19 @@ class Tracker:
             if core.nodes:
                 self.node_events(NodeEvents.build(1, **at, node=0, speed=5.0))
             self.tracks()
-            judge(spare)
+            update_lifecycle(spare)
         finally:
             self._core = own
 
 
+COURSE_SPEED = 2.0
+"""m/s, above which the direction of motion is told as heading; below it is noise."""
+
+
 def _course(state: Array) -> Array:
-    """Direction of motion rad (n,), nan below 2 m/s."""
+    """Direction of motion rad (n,), nan below COURSE_SPEED."""
     speed = np.hypot(state[:, 2], state[:, 3])
-    return np.where(speed > 2.0, np.arctan2(state[:, 2], state[:, 3]) % (2 * np.pi), np.nan)
+    return np.where(speed > COURSE_SPEED, np.arctan2(state[:, 2], state[:, 3]) % (2 * np.pi), np.nan)
 
 
 def _made_up_sector(site: RadarSite, turn: int) -> SectorPlots:

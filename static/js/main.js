@@ -12,7 +12,7 @@ import { AlertPanel, needsAttention } from './panels/alerts.js';
 import { byId, setText } from './panels/dom.js';
 import { makeHelp } from './panels/help.js';
 import { TargetList } from './panels/list.js';
-import { PartsPanel } from './panels/parts.js';
+import { ProcessingPanel } from './panels/processing.js';
 import { RunwayPanel } from './panels/runways.js';
 import { SensorPanel } from './panels/sensors.js';
 import { StatusBar } from './panels/status.js';
@@ -45,7 +45,7 @@ const error = (/** @type {string} */ text) => status.toast(text, 'error');
 const alerts = new AlertPanel(picture, { onOpen: (alert) => display.showAlert(alert), onError: error });
 const runways = new RunwayPanel(picture, { onError: error, onOpen: (id) => display.showRunway(id) });
 const sensors = new SensorPanel(picture);
-const parts = new PartsPanel(picture, { onError: error });
+const processing = new ProcessingPanel(picture, { onError: error });
 const target = new TargetPanel(picture, {
   onClose: () => display.select(null),
   onFollow: () => follow(),
@@ -197,7 +197,7 @@ function refresh() {
     () => alerts.update(),
     () => runways.update(display.alertedRunways()),
     () => sensors.update(),
-    () => parts.update(nowMs),
+    () => processing.update(nowMs),
     () => target.update(display.selected, display.following),
     () => {
       const live = picture.liveAlerts();

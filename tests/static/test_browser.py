@@ -277,32 +277,32 @@ def test_the_parts_of_a_radar_are_changed_with_the_keyboard_alone(screen: Screen
     for name in ("hybrid", "adaptive"):  # compiled before it is waited for
         serving.service.choose_parts("smr-1", {"detect": {"name": name}})
     assert running() == "adaptive"
-    page.locator("#parts-open summary").wait_for()
-    page.locator("#parts-open summary").focus()
+    page.locator("#processing-open summary").wait_for()
+    page.locator("#processing-open summary").focus()
     page.keyboard.press("Enter")
-    first = page.locator('#parts-list [data-key="smr-1"]')
+    first = page.locator('#processing-list [data-key="smr-1"]')
     first.wait_for()
     assert "214 plots a turn" in first.inner_text()
     assert "18 ms" in first.inner_text()
-    assert first.locator(".parts-apply").is_hidden()
+    assert first.locator(".processing-apply").is_hidden()
     page.keyboard.press("Tab")
     page.keyboard.type("hyb")
-    first.locator(".parts-apply").wait_for()
+    first.locator(".processing-apply").wait_for()
     assert running() == "adaptive", "nothing is sent before it is applied"
     for _ in range(8):
         page.keyboard.press("Tab")
-        if page.evaluate("document.activeElement.classList.contains('parts-apply')"):
+        if page.evaluate("document.activeElement.classList.contains('processing-apply')"):
             break
     page.keyboard.press("Enter")
     until(lambda: running() == "hybrid", "the hybrid detector runs")
-    screen.until("document.querySelector('#parts-list .parts-words').textContent === ''")
-    assert first.locator(".parts-orders").is_hidden()
+    screen.until("document.querySelector('#processing-list .processing-words').textContent === ''")
+    assert first.locator(".processing-orders").is_hidden()
     assert page.evaluate("document.activeElement.tagName") == "SELECT", "the keyboard is not lost"
     first.locator("select").first.select_option("adaptive")
-    first.locator(".parts-orders .plain").click()
+    first.locator(".processing-orders .plain").click()
     assert first.locator("select").first.input_value() == "hybrid"
     serving.service.choose_parts("smr-1", {"detect": {"name": "adaptive"}})
-    screen.until("document.querySelector('#parts-list select').value === 'adaptive'")
+    screen.until("document.querySelector('#processing-list select').value === 'adaptive'")
     assert screen.errors == []
 
 

@@ -27,7 +27,7 @@ def slow_costs(tracks: Expected, plots: Measured) -> np.ndarray:
             s = tracks.covariance[i, :2, :2] + plots.noise[j] + wander
             d2 = off @ np.linalg.solve(s, off)
             if d2 <= PART.gate and abs(dt) <= tracks.window[i] and np.hypot(*off) <= PART.max_gate_m:
-                made[i, j] = d2 + np.log(np.linalg.det(s)) - PART.worth + tracks.penalty[i]
+                made[i, j] = d2 + np.log(np.linalg.det(s)) - PART.log_likelihood_ratio + tracks.penalty[i]
     return made
 
 

@@ -44,8 +44,8 @@ class FlatZones:
 
 @dataclass(frozen=True)
 class Target:
-    """path: time since T0 -> (east, north). hidden: times since T0 at which it is not detected. parts: how many plots
-    it falls into.
+    """path: time since T0 -> (east, north). hidden: times since T0 at which it is not detected. fragments: how many
+    plots it falls into.
     """
 
     path: Callable[[float], tuple[float, float]]
@@ -55,7 +55,7 @@ class Target:
     born: float = 0.0
     gone: float = np.inf
     hidden: tuple[tuple[float, float], ...] = ()
-    parts: Callable[[int], int] = lambda scan: 1
+    fragments: Callable[[int], int] = lambda scan: 1
 
     def course(self, t: float) -> float:
         e, n = np.subtract(self.path(t + 0.05), self.path(t - 0.05))
@@ -105,13 +105,13 @@ def scan_plots(
         noise = rng.normal(0, sd, 2)
         if not seen or not one.born <= t < one.gone or any(a <= t < b for a, b in one.hidden):
             continue
-        parts, course = one.parts(scan), one.course(t)
+        fragments, course = one.fragments(scan), one.course(t)
         along = np.array([np.sin(course), np.cos(course)])
-        for part in range(parts):
-            offset = ((part + 0.5) / parts - 0.5) * one.length * along
+        for fragment in range(fragments):
+            offset = ((fragment + 0.5) / fragments - 0.5) * one.length * along
             time.append(T0 + t)
             place.append(np.array(one.path(t)) + offset + noise)
-            length.append(one.length / parts)
+            length.append(one.length / fragments)
             width.append(one.width)
             bearing.append(course % np.pi)
     for _ in range(rng.poisson(false)):

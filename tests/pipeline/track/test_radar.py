@@ -247,8 +247,8 @@ def test_a_silent_radar_lets_all_tracks_coast_and_end() -> None:
 
 
 def test_a_split_aircraft_stays_one_track_where_its_middle_is() -> None:
-    """Its echo falls into two or three parts in every second turn once it is known."""
-    target = Target(line(500, 300, 8, 2), 45, 6, parts=lambda scan: 1 if scan < 10 else 1 + scan % 3)
+    """Its echo falls into two or three fragments in every second turn once it is known."""
+    target = Target(line(500, 300, 8, 2), 45, 6, fragments=lambda scan: 1 if scan < 10 else 1 + scan % 3)
     off = []
 
     def watch(scan: int) -> None:
@@ -266,14 +266,14 @@ def test_a_split_aircraft_stays_one_track_where_its_middle_is() -> None:
 
 
 def test_what_stands_off_the_pavement_and_never_moved_is_not_reported_unless_wanted() -> None:
-    from pipeline.track.core import TrackerSettings
+    from pipeline.track.settings import ReportingSettings, TrackerSettings
 
     tree, car = Target(line(500, 300, 0, 0), 4, 4), Target(line(-500, 300, 6, 0), 6, 3)
     grass = FlatZones(SurfaceKind.GRASS)
     seen = run(make_tracker(zones=grass), [tree, car], 15).tracks()
     assert len(seen) == 1
     assert error(seen, car) < 8
-    settings = TrackerSettings(report_fixed_off_pavement=True)
+    settings = TrackerSettings(reporting=ReportingSettings(fixed_off_pavement=True))
     assert len(run(make_tracker(zones=grass, settings=settings), [tree, car], 15).tracks()) == 2
     assert len(run(make_tracker(), [tree, car], 15).tracks()) == 2  # on the pavement: a lost suitcase
 

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { cutWords, learningWords, orderOf } from '../../../static/js/panels/parts.js';
+import { cutWords, learningWords, orderOf } from '../../../static/js/panels/processing.js';
 
 const hybrid = { name: 'hybrid', pfa: 1e-6 };
 const adaptive = { name: 'adaptive', pfa: 1e-6 };

@@ -32,7 +32,7 @@ def test_nose_wing_and_tail_on_the_apron_become_one_track_in_the_middle() -> Non
     tracks = feed(tracker, pieces(400, 300), 40)
     assert len(tracks) == 1
     assert np.hypot(*(tracks.state[0, :2] - (400, 300))) < 8
-    assert tracker.counters["parts_joined"] >= 2
+    assert tracker.counters["fragments_joined"] >= 2
     number, confirmed = int(tracks.id[0]), tracker.counters["confirmed"]
     tracks = feed(tracker, pieces(400, 300), 1)
     for scan in range(40, 90):
@@ -41,10 +41,10 @@ def test_nose_wing_and_tail_on_the_apron_become_one_track_in_the_middle() -> Non
             tracker.sector(sector)
         assert len(tracker.tracks()) == 1
     assert tracker.tracks().id.tolist() == [number]
-    assert tracker.counters["confirmed"] == confirmed  # its parts start nothing any more
+    assert tracker.counters["confirmed"] == confirmed  # its fragments start nothing any more
 
 
-def test_the_parts_of_a_named_aircraft_are_its_own_anywhere() -> None:
+def test_the_fragments_of_a_named_aircraft_are_its_own_anywhere() -> None:
     tracks = feed(make_tracker(), pieces(400, 300), 30, name=(400.0, 300.0))
     assert tracks.callsign.tolist() == ["AFR16PL"]
 

@@ -38,7 +38,7 @@ export function learningWords(state) {
 }
 
 /** One card a radar, filled only while the panel is open. */
-export class PartsPanel {
+export class ProcessingPanel {
   /**
    * @param {import('../feed/picture.js').PictureState} picture
    * @param {{onError: (text: string) => void}} hooks
@@ -46,9 +46,9 @@ export class PartsPanel {
   constructor(picture, hooks) {
     this.picture = picture;
     this.hooks = hooks;
-    this.section = byId('parts');
-    this.box = /** @type {HTMLDetailsElement} */ (byId('parts-open'));
-    this.list = byId('parts-list');
+    this.section = byId('processing');
+    this.box = /** @type {HTMLDetailsElement} */ (byId('processing-open'));
+    this.list = byId('processing-list');
     /** @type {Map<string, RadarParts>} */
     this.states = new Map();
     /** @type {Map<string, Map<string, string>>} by radar: the names picked by hand, by verb, not yet sent */
@@ -66,7 +66,7 @@ export class PartsPanel {
   update(nowMs) {
     const radars = [...this.picture.sensors.values()].filter((one) => one.kind === 'radar' && Object.keys(one.parts ?? {}).length);
     this.section.hidden = radars.length === 0;
-    setText(byId('parts-short'), this.box.open || radars.length !== 1 ? '' : Object.values(radars[0].parts ?? {}).join(' · '));
+    setText(byId('processing-short'), this.box.open || radars.length !== 1 ? '' : Object.values(radars[0].parts ?? {}).join(' · '));
     if (!this.box.open) return;
     if (nowMs - this.askedMs >= POLL_MS && !document.hidden) {
       this.askedMs = nowMs;
@@ -88,12 +88,12 @@ export class PartsPanel {
 
   /** @param {string} radar @returns {HTMLElement} */
   make(radar) {
-    return el('li', { class: 'parts-radar', 'aria-label': `Processing of radar ${radar}` },
-      el('div', { class: 'parts-name', text: radar }), el('div', { class: 'parts-picks' }),
-      el('div', { class: 'parts-learning', role: 'status' }, el('progress', { 'aria-hidden': 'true', hidden: true }), el('span', { class: 'parts-words' })),
-      el('div', { class: 'parts-figures' }),
-      el('div', { class: 'parts-orders', hidden: true },
-        el('button', { type: 'button', class: 'parts-apply', text: 'Apply', onclick: () => this.send(radar) }),
+    return el('li', { class: 'processing-radar', 'aria-label': `Processing of radar ${radar}` },
+      el('div', { class: 'processing-name', text: radar }), el('div', { class: 'processing-picks' }),
+      el('div', { class: 'processing-learning', role: 'status' }, el('progress', { 'aria-hidden': 'true', hidden: true }), el('span', { class: 'processing-words' })),
+      el('div', { class: 'processing-figures' }),
+      el('div', { class: 'processing-orders', hidden: true },
+        el('button', { type: 'button', class: 'processing-apply', text: 'Apply', onclick: () => this.send(radar) }),
         el('button', { type: 'button', class: 'plain', text: 'Keep what runs', onclick: () => this.forget(radar) })));
   }
 
@@ -101,9 +101,9 @@ export class PartsPanel {
   fill(element, radar) {
     const state = this.states.get(radar);
     if (!state) return;
-    const part = (/** @type {string} */ name) => /** @type {HTMLElement} */ (element.querySelector(name));
+    const child = (/** @type {string} */ name) => /** @type {HTMLElement} */ (element.querySelector(name));
     const wanted = this.wanted.get(radar) ?? new Map();
-    keyed(part('.parts-picks'), Object.keys(state.running), String, (verb) => this.pick(radar, verb, state), (row, verb) => {
+    keyed(child('.processing-picks'), Object.keys(state.running), String, (verb) => this.pick(radar, verb, state), (row, verb) => {
       const select = /** @type {HTMLSelectElement} */ (row.querySelector('select'));
       const name = wanted.get(verb) ?? (state.next ?? state.running)[verb].name;
       if (select.value !== name) select.value = name;
@@ -111,16 +111,16 @@ export class PartsPanel {
       row.classList.toggle('is-changed', name !== state.running[verb].name);
       row.title = state.available[verb].find((one) => one.name === name)?.about ?? '';
       const ms = state.ms_a_turn[verb];
-      setText(/** @type {HTMLElement} */ (row.querySelector('.parts-ms')), isNumber(ms) ? `${ms < 10 ? ms.toFixed(1) : Math.round(ms)} ms` : '–');
+      setText(/** @type {HTMLElement} */ (row.querySelector('.processing-ms')), isNumber(ms) ? `${ms < 10 ? ms.toFixed(1) : Math.round(ms)} ms` : '–');
     });
     const cut = cutWords(state);
-    setText(part('.parts-figures'), `${state.plots_a_scan} plots a turn${cut ? `  ◐ ${cut} in 10 s` : ''}`);
-    part('.parts-figures').classList.toggle('is-cut', Boolean(cut));
+    setText(child('.processing-figures'), `${state.plots_a_scan} plots a turn${cut ? `  ◐ ${cut} in 10 s` : ''}`);
+    child('.processing-figures').classList.toggle('is-cut', Boolean(cut));
     const changed = Object.keys(orderOf(state, wanted)).length > 0;
-    part('.parts-orders').hidden = !changed || this.busy.has(radar);
+    child('.processing-orders').hidden = !changed || this.busy.has(radar);
     const learning = learningWords(state);
-    setText(part('.parts-words'), this.busy.has(radar) ? 'being made ready…' : learning);
-    const bar = /** @type {HTMLProgressElement} */ (part('progress'));
+    setText(child('.processing-words'), this.busy.has(radar) ? 'being made ready…' : learning);
+    const bar = /** @type {HTMLProgressElement} */ (child('progress'));
     bar.hidden = !learning || this.busy.has(radar);
     if (learning && isNumber(state.scans_left)) {
       bar.max = Math.max(Number(bar.dataset.most ?? 1), state.scans_left);
@@ -137,7 +137,7 @@ export class PartsPanel {
       this.update(performance.now());
     } });
     for (const one of state.available[verb] ?? []) select.append(el('option', { value: one.name, text: one.name, title: one.about }));
-    return el('label', { class: 'parts-pick' }, el('span', { class: 'parts-verb', text: titleOf(verb) }), select, el('span', { class: 'parts-ms', title: 'milliseconds a turn' }));
+    return el('label', { class: 'processing-pick' }, el('span', { class: 'processing-verb', text: titleOf(verb) }), select, el('span', { class: 'processing-ms', title: 'milliseconds a turn' }));
   }
 
   /** @param {string} radar */
