@@ -6,8 +6,8 @@ import json
 from dataclasses import dataclass
 
 import pipeline.tables.codec as table_codec
-import pipeline.values as value_codec
-from pipeline import value_reader
+import pipeline.values.codec as value_codec
+from pipeline.values import reader as value_reader
 
 MESSAGE_ENCODING = "airside"
 SCHEMA_ENCODING = "airside"

@@ -95,7 +95,8 @@ class JournalReplay:
         self.console.print(
             f"{found.inputs} inputs{span}: {found.pictures} pictures of {len(Tracks.columns())} columns"
             f" ({found.columns} columns compared), {found.changes} alert changes, {found.snapshots} snapshots,"
-            f" {found.runs} {'run' if found.runs == 1 else 'runs'}, {found.gaps} gaps",
+            f" {found.runs} {'run' if found.runs == 1 else 'runs'}, {found.gaps} gaps"
+            + (f", {found.sectors} sectors detected again" if found.sectors else ""),
             highlight=False,
         )
         if found.failures:

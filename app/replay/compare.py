@@ -25,11 +25,12 @@ def compare(
     Raises JournalError when the journal cannot be used, SettingsError for an order that cannot change anything.
     """
     sweeps = SWEEPS in journal.topics()
+    own = frozenset(verb for verb in VIDEO_PARTS if any(order.startswith(f"parts.{verb}") for order in orders))
 
     def change(run: RecordedRun) -> RecordedRun:
         return changed(run, orders, sweeps=sweeps)
 
-    replay, made = ReplayEngine(journal, change), PictureComparison()
+    replay, made = ReplayEngine(journal, change, own), PictureComparison()
     for one in replay.replayed(since, until):
         if isinstance(one, Record):
             if one.topic == SNAPSHOT and replay.lost:

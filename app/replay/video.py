@@ -50,8 +50,14 @@ class VideoReplay:
 
     def sector(self, recorded: SectorPlots) -> SectorPlots | None:
         """What the chain makes of the block that `recorded` was made of; None when that block is not known."""
-        waiting = self._made.get(key(recorded))
-        return waiting.pop(0) if waiting else None
+        place = key(recorded)
+        waiting = self._made.get(place)
+        if not waiting:
+            return None
+        made = waiting.pop(0)
+        if not waiting:
+            del self._made[place]
+        return made
 
     def _restore(self, state: ChainState) -> None:
         chosen = {verb: self._part(verb, state) for verb in FRONT_END}

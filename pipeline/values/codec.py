@@ -31,10 +31,9 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.differences import first_difference
 from pipeline.tables import codec
 from pipeline.tables.schema import Table
-from pipeline.value_reader import (
+from pipeline.values.reader import (
     CLASS,
     COUNT,
     DTYPE,
@@ -48,8 +47,6 @@ from pipeline.value_reader import (
     VERSION,
     ValueReader,
 )
-
-__all__ = ["ValueCodec", "first_difference", "is_value"]
 
 
 def is_value(data: codec.Octets) -> bool:

@@ -17,10 +17,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.differences import first_difference
 from pipeline.picture import Alert, AlertChange, AlertTarget
 from pipeline.tables import Source, Table, Tracks
 from pipeline.values import ValueCodec, is_value
+from pipeline.values.differences import first_difference
 from tests.pipeline.tables.made import table_of, tables
 
 
@@ -185,7 +185,7 @@ def test_great_sizes_in_few_octets_take_no_memory() -> None:
 
 def test_order_of_sets_and_of_classes_leaves_no_trace() -> None:
     script = (
-        "from tests.pipeline.tables.test_values import *\n"
+        "from tests.pipeline.values.test_values import *\n"
         "print(codec.encode([{'a','b','c', Colour.RED, Source.NODE}, frozenset('xyz')]).hex())"
     )
     told = {
