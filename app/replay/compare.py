@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from app.journal.names import JournalError
 from app.journal.reader import Journal, Record
-from app.replay.recorded import RecordedRun, changed
+from app.replay.recorded import VIDEO_PARTS, RecordedRun, changed
 from app.replay.verify import ReplayEngine
 from pipeline.engine_records import SNAPSHOT, SWEEPS
 from pipeline.lab.measure.compare_pictures import PictureComparison
