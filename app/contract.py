@@ -24,6 +24,14 @@ class Refused(ValueError):
     """The command or the data cannot be taken; the message says why."""
 
 
+class RefusedTime(Refused):
+    """Everything in a message is refused for its time. counts: rows by reason ("ahead", "behind", "invalid")."""
+
+    def __init__(self, message: str, counts: Mapping[str, int]) -> None:
+        super().__init__(message)
+        self.counts = dict(counts)
+
+
 @dataclass(frozen=True, slots=True)
 class Readiness:
     """What has been reached at start-up: every check by name, ready when all are true."""
@@ -66,6 +74,37 @@ class FrontEnd:
     cut: dict[str, int]
 
 
+@dataclass(frozen=True, slots=True)
+class ReplayState:
+    """Where the replay of a journal stands. begin, end, time: UTC s of the recording. speed: times the recorded pace.
+
+    source: name of the journal. gaps: times at which the recording has a hole or the service was started anew.
+    """
+
+    source: str
+    begin: float
+    end: float
+    time: float
+    playing: bool
+    speed: float
+    gaps: tuple[float, ...] = ()
+
+
+class ReplayControl(Protocol):
+    """Steers the replay of a journal. All methods may be called from any thread."""
+
+    def state(self) -> ReplayState:
+        """Where it stands."""
+
+    def steer(
+        self, *, playing: bool | None = None, speed: float | None = None, time: float | None = None
+    ) -> ReplayState:
+        """Play or pause, at another pace, from another time (UTC s of the recording); None leaves as it is.
+
+        Raises Refused for a time outside the recording and for a speed that is not in 0.1 .. 64.
+        """
+
+
 PictureListener = Callable[[Picture, tuple[AlertChange, ...]], None]
 """Called in the surface thread for every new picture; must return at once and must not raise."""
 
@@ -78,6 +117,8 @@ class Service(Protocol):
     airport_geojson: dict[str, Any]
     radars: tuple[RadarSite, ...]
     nodes: tuple[NodeSite, ...]
+    replay: ReplayControl | None
+    """How to steer what is shown; None for a service that shows what happens now."""
 
     def readiness(self) -> Readiness:
         """Which of the start-up checks (database, warm-up, picture) are passed."""
@@ -114,8 +155,11 @@ class Service(Protocol):
     def submit_sweeps(self, radar: str, body: bytes) -> dict[str, int]:
         """Take sweeps in the documented octet form; counts taken and dropped. Raises UnknownId, Refused."""
 
-    def submit_node_events(self, events: NodeEvents) -> None:
-        """Take node events (their `node` is the index in `nodes`). Raises Refused when the queue is full."""
+    def submit_node_events(self, events: NodeEvents) -> dict[str, int]:
+        """Take node events (their `node` is the index in `nodes`); counts taken and, by reason, refused for their time.
 
-    def submit_target_reports(self, reports: TargetReports) -> None:
-        """Take target reports. Raises Refused when the queue is full."""
+        Raises RefusedTime when all are refused, Refused when the queue is full.
+        """
+
+    def submit_target_reports(self, reports: TargetReports) -> dict[str, int]:
+        """Take target reports; counts and raises like `submit_node_events`."""

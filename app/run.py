@@ -9,7 +9,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import uvicorn
 from rich.console import Console
@@ -19,6 +19,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from app.airports import load_airport
 from app.api.application import create_app
 from app.bus import connect_bus
+from app.contract import Service
 from app.ingest.mqtt import MqttThread
 from app.live.hub import Hub
 from app.service import SurfaceService
@@ -29,6 +30,23 @@ if TYPE_CHECKING:
     from app.view3d import View3D
 
 log = logging.getLogger("airside")
+
+
+class Served(Protocol):
+    """What can be served: an application over a service, with a begin and an end."""
+
+    settings: Settings
+    app: Any
+
+    @property
+    def service(self) -> Service:
+        """What the application shows."""
+
+    def begin(self, step: Callable[[str], None]) -> None:
+        """Start it; `step` hears what is being done. Raises what goes wrong."""
+
+    def end(self) -> None:
+        """Stop everything."""
 
 
 class Running:
@@ -103,11 +121,11 @@ class Running:
         self._ends.callback(feed.stop)
 
 
-def serve(settings: Settings, console: Console) -> int:
-    """Run until SIGINT or SIGTERM; the exit status."""
+def serve(settings: Settings, console: Console, running: Served | None = None) -> int:
+    """Run until SIGINT or SIGTERM; the exit status. running: what is served, a service made of the settings if none."""
     _log_to(console, settings.log_level)
     listening = _listen(settings)
-    running = Running(settings)
+    running = running or Running(settings)
     config = uvicorn.Config(
         running.app,
         host=settings.host,
@@ -145,7 +163,7 @@ def serve(settings: Settings, console: Console) -> int:
     return 1 if failed or not server.started else 0
 
 
-def _begin_aloud(running: Running, console: Console, server: uvicorn.Server, port: int) -> None:
+def _begin_aloud(running: Served, console: Console, server: uvicorn.Server, port: int) -> None:
     begun = time.monotonic()
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=not console.is_terminal) as progress:

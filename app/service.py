@@ -6,26 +6,36 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Mapping
-from typing import Any
+from dataclasses import replace
+from functools import partial
+from typing import Any, TypeVar
 
 from app.assembly import FRONT_END, build_parts, chain_of, check_parts, node_site, radar_site, surface_engine
-from app.contract import FrontEnd, PictureListener, Readiness, Refused, UnknownId, Video
+from app.contract import FrontEnd, PictureListener, Readiness, Refused, RefusedTime, ReplayControl, UnknownId, Video
 from app.ingest.octets import OctetIntake
 from app.ingest.udp import VideoReceiver
+from app.journal.recorder import JournalRecorder
+from app.journal.video import VideoRecorder
+from app.runtime.clocks import FeedTimes, RadarTimes
 from app.runtime.compile_apart import CompilerApart
 from app.runtime.front_end import FrontEndSwitch
+from app.runtime.host_clock import HostClock
 from app.runtime.radar_worker import RadarWorker
 from app.runtime.state_keeper import StateKeeper
 from app.runtime.surface_worker import SurfaceWorker
 from app.settings import Settings
 from pipeline.airport.model import Airport
 from pipeline.airport.surfaces import surface_of_radar
+from pipeline.chain import RadarChain
+from pipeline.inputs import Acknowledge, Command, PartsChanged, SetRunway
 from pipeline.picture import Alert, AlertChange, Picture, RunwayState, SensorState, Visibility
 from pipeline.sites import RadarSite
-from pipeline.tables import NodeEvents, TargetReports
+from pipeline.tables import NodeEvents, Sweeps, TargetReports
 from pipeline.track.expected_headings import expected_headings
 
 log = logging.getLogger(__name__)
+
+Rows = TypeVar("Rows", NodeEvents, TargetReports)
 
 SENSOR_SILENT_S = 10.0
 """Target reports and node events are called silent after this long without any."""
@@ -34,16 +44,21 @@ SENSOR_SILENT_S = 10.0
 class SurfaceService:
     """One airport, running. Made cold; `prepare` warms it, `start` starts its threads, `stop` ends them.
 
-    Raises SettingsError when the settings name a part or a setting of one that does not exist.
+    clock: of the time of arrival. Raises SettingsError when the settings name a part or a setting of one that does not
+    exist.
     """
 
-    def __init__(self, settings: Settings, airport: Airport, airport_geojson: dict[str, Any]) -> None:
+    def __init__(
+        self, settings: Settings, airport: Airport, airport_geojson: dict[str, Any], clock: HostClock | None = None
+    ) -> None:
         check_parts(settings)
+        self.clock = clock if clock is not None else HostClock()
         self.settings = settings
         self.airport = airport
         self.airport_geojson = airport_geojson
         self.radars = tuple(radar_site(one, airport) for one in settings.radars)
         self.nodes = tuple(node_site(one, airport) for one in settings.nodes)
+        self.replay: ReplayControl | None = None
         self.checks = {"database": False, "warm": False, "picture": False}
         self.extra_counters: dict[str, Callable[[], dict[str, int]]] = {}
         self.extra_sensors: list[Callable[[], SensorState]] = []
@@ -59,12 +74,21 @@ class SurfaceService:
         )
         self._receivers: dict[str, VideoReceiver] = {}
         self._surface: SurfaceWorker | None = None
+        self._journal: JournalRecorder | None = None
         self._heard: dict[str, tuple[float, float, int]] = {}
         self._octets = {
             site.id: OctetIntake(site, index, radar.blocks_per_scan)
             for index, (site, radar) in enumerate(zip(self.radars, settings.radars, strict=True))
         }
         self._octets_lock = threading.Lock()
+        self._radar_times = {
+            site.id: RadarTimes(site, radar.clock, self.clock)
+            for site, radar in zip(self.radars, settings.radars, strict=True)
+        }
+        self._feed_times = {
+            "nodes": FeedTimes("event", settings.clocks.nodes, [one.id for one in self.nodes]),
+            "reports": FeedTimes("report", settings.clocks.reports),
+        }
 
     def prepare(self, first_alert: int = 1, resume: bool = True) -> None:
         """Build the chains and the engine and compile every kernel. Raises SettingsError.
@@ -75,8 +99,17 @@ class SurfaceService:
             self.settings, self.airport, self.radars, self.nodes, first_alert=first_alert, clock=time.perf_counter
         )
         engine.tracker.warm()
+        if self.settings.journal.folder is not None:
+            self._journal = JournalRecorder(self.settings, self.airport_geojson, self.settings.journal)
+            self.extra_sensors.append(self._journal.state)
         self._surface = SurfaceWorker(
-            engine, self.sensors, self.settings.limits.rows_queued, self._stage_timings, self._expect
+            engine,
+            self.sensors,
+            self.settings.limits.rows_queued,
+            self._stage_timings,
+            self._expect,
+            clock=self.clock,
+            recorder=self._journal,
         )
         for index, (site, radar) in enumerate(zip(self.radars, self.settings.radars, strict=True)):
             ground = surface_of_radar(self.airport, site)
@@ -84,11 +117,15 @@ class SurfaceService:
             chain.warm()
             if resume:
                 self._keeper.take_up(chain)
-            worker = RadarWorker(site, chain, self.settings.limits.blocks_queued, self._surface.inbox.offer)
-            self._switches[site.id] = FrontEndSwitch(worker, index, ground, self._compiler)
+            record = self._video_recorder()
+            worker = RadarWorker(site, chain, self.settings.limits.blocks_queued, self._surface.offer, record)
+            self._switches[site.id] = FrontEndSwitch(
+                worker, index, ground, self._compiler, partial(self._parts_changed, site.id)
+            )
             self._workers[site.id] = worker
             if radar.udp is not None:
-                self._receivers[site.id] = VideoReceiver(site, index, radar, worker.put)
+                deliver = self._taker(worker)
+                self._receivers[site.id] = VideoReceiver(site, index, radar, deliver, self.clock)
         self.checks["warm"] = True
 
     def start(self) -> None:
@@ -112,6 +149,8 @@ class SurfaceService:
         self._keeper.stop()
         if self._surface is not None:
             self._surface.stop()
+        if self._journal is not None and not self._journal.close():
+            log.error("the end of the journal could not be written in time")
 
     def video_port(self, radar: str) -> int:
         """The UDP port that a radar's datagrams go to. Raises UnknownId."""
@@ -138,7 +177,7 @@ class SurfaceService:
         others = []
         if self.nodes:
             others.append(self._feed_state("nodes", "node", all(node.simulated for node in self.nodes)))
-        if "reports" in self._heard:
+        if "reports" in self._heard or self._feed_times["reports"].heard:
             others.append(self._feed_state("reports", "report", False))
         return (*radars, *others, self._surface_state(), *(one() for one in self.extra_sensors))
 
@@ -161,34 +200,34 @@ class SurfaceService:
 
     def acknowledge(self, alert: int, by: str) -> Alert:
         """Acknowledge a live alert."""
-        surface = self._running
-
-        def work(engine: Any) -> AlertChange:
-            change: AlertChange = engine.monitor.acknowledge(alert, by, engine.time)
-            surface.record_change(change)
-            return change
-
-        try:
-            change: AlertChange = surface.ask(work)
-        except KeyError as error:
-            raise UnknownId(alert) from error
-        except ValueError as error:
-            raise Refused(str(error)) from error
-        return change.alert
+        acknowledged: Alert = self._carried_out(Acknowledge(alert, by), alert)
+        return acknowledged
 
     def set_runway(
         self, runway: str, *, open: bool | None, in_use: str | None, visibility: Visibility | None
     ) -> RunwayState:
         """Set how a runway is used."""
+        state: RunwayState = self._carried_out(SetRunway(runway, open, in_use, visibility), runway)
+        return state
+
+    def _video_recorder(self) -> Callable[[RadarChain, Sweeps], None]:
+        """What records the raw sweeps of one radar; nothing does where they are not wanted."""
+        if self._journal is None or not self.settings.journal.sweeps:
+            return lambda _chain, _block: None
+        return VideoRecorder(self._journal.writer, self.clock.now).before
+
+    def _parts_changed(self, radar: str, parts: dict[str, Any]) -> None:
+        """For those who read the journal: the engine itself does not mind."""
+        self._running.offer(PartsChanged(radar, parts))
+
+    def _carried_out(self, command: Command, id: int | str) -> Any:
+        """The engine's answer to a command about `id`. Raises UnknownId, Refused."""
         try:
-            state: RunwayState = self._running.ask(
-                lambda engine: engine.monitor.set_runway(runway, open=open, in_use=in_use, visibility=visibility)
-            )
+            return self._running.ask(command)
         except KeyError as error:
-            raise UnknownId(runway) from error
+            raise UnknownId(id) from error
         except ValueError as error:
             raise Refused(str(error)) from error
-        return state
 
     def submit_sweeps(self, radar: str, body: bytes) -> dict[str, int]:
         """Take sweeps in octet form, as if they had come by datagram."""
@@ -197,20 +236,21 @@ class SurfaceService:
         worker = self._workers.get(radar)
         if worker is None:
             raise Refused("the service is still starting")
+        arrival = self.clock.now()
+        take = self._taker(worker)
         with self._octets_lock:
             blocks, counted = self._octets[radar].take(body)
             for block in blocks:
-                worker.put(block)
+                take(replace(block, arrival=arrival))
         return counted
 
-    def submit_node_events(self, events: NodeEvents) -> None:
+    def submit_node_events(self, events: NodeEvents) -> dict[str, int]:
         """Take node events, and have them stored."""
-        self._submit("nodes", events)
-        self.keep_node_events(events)
+        return self._submit("nodes", events, self.keep_node_events)
 
-    def submit_target_reports(self, reports: TargetReports) -> None:
+    def submit_target_reports(self, reports: TargetReports) -> dict[str, int]:
         """Take target reports."""
-        self._submit("reports", reports)
+        return self._submit("reports", reports)
 
     @property
     def _running(self) -> SurfaceWorker:
@@ -226,13 +266,24 @@ class SurfaceService:
             raise Refused("the service is still starting")
         return switch
 
-    def _submit(self, kind: str, table: NodeEvents | TargetReports) -> None:
-        if not len(table):
-            return
-        if not self._running.inbox.offer(table):
-            raise Refused(f"the queue for {kind} is full")
-        _, _, total = self._heard.get(kind, (0.0, 0.0, 0))
-        self._heard[kind] = (time.monotonic(), float(table.time.max()), total + len(table))
+    def _taker(self, worker: RadarWorker) -> Callable[[Sweeps], None]:
+        """What takes a radar's blocks: their times are corrected on the way to the worker."""
+        times = self._radar_times[worker.site.id]
+        return lambda block: worker.put(times.correct(block))
+
+    def _submit(self, kind: str, table: Rows, keep: Callable[[Rows], None] = lambda _: None) -> dict[str, int]:
+        """Judge the times, queue what is good, and count."""
+        surface = self._running
+        good, refused, why = self._feed_times[kind].judge(table, self.clock.now())
+        if refused and not len(good):
+            raise RefusedTime(why if len(table) == 1 else f"all {len(table)} are refused; {why}", refused)
+        if len(good):
+            if not surface.offer(good):
+                raise Refused(f"the queue for {kind} is full")
+            _, _, total = self._heard.get(kind, (0.0, 0.0, 0))
+            self._heard[kind] = (time.monotonic(), float(good.time.max()), total + len(good))
+            keep(good)
+        return {"taken": len(good), **{f"refused_{reason}": count for reason, count in refused.items()}}
 
     def _first_picture(self, picture: Picture, _changes: tuple[AlertChange, ...]) -> None:
         self.checks["picture"] = True
@@ -260,17 +311,20 @@ class SurfaceService:
         counters.update(worker.counters())
         counters.update(self._keeper.counters(site.id))
         switch = self._switches[site.id]
-        detail = "; ".join(words for words in (worker.cuts.words(), switch.learning) if words)
-        return SensorState(
-            site.id, "radar", worker.status, worker.last_time, site.simulated, detail, counters, switch.names
-        )
+        times = self._radar_times[site.id]
+        clock = times.words()
+        detail = "; ".join(words for words in (clock, worker.cuts.words(), switch.learning) if words)
+        status = "degraded" if clock and worker.status == "ok" else worker.status
+        state = SensorState(site.id, "radar", status, worker.last_time, site.simulated, detail, counters, switch.names)
+        return times.shown(state)
 
     def _feed_state(self, id: str, kind: str, simulated: bool) -> SensorState:
-        heard = self._heard.get(id)
+        heard, times = self._heard.get(id), self._feed_times[id]
         if heard is None:
-            return SensorState(id, kind, "waiting", None, simulated)
+            return times.shown(SensorState(id, kind, "waiting", None, simulated))
         silent = time.monotonic() - heard[0] > SENSOR_SILENT_S and kind != "node"
-        return SensorState(id, kind, "silent" if silent else "ok", heard[1], simulated, counters={"taken": heard[2]})
+        state = SensorState(id, kind, "silent" if silent else "ok", heard[1], simulated, counters={"taken": heard[2]})
+        return times.shown(state)
 
     def _surface_state(self) -> SensorState:
         surface = self._surface
@@ -278,7 +332,7 @@ class SurfaceService:
             return SensorState("surface", "tracker", "waiting", None)
         held_now, held_ever = surface.engine.monitor.held_back
         counters = {
-            **surface.engine.tracker.counters,
+            **surface.engine.counters,
             "alerts_held_back": held_ever,
             "queue_refused": surface.inbox.refused,
             "failures": surface.failures,

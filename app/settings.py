@@ -42,6 +42,27 @@ class UdpSettings(Section):
     sic: int | None = Field(None, ge=0, le=255, description="take only this system identification code")
 
 
+class ClockSettings(Section):
+    """How the times that a source states are taken."""
+
+    mode: Literal["auto", "taken", "corrected", "arrival"] = Field(
+        "auto",
+        description="taken: as stated; corrected: the estimated offset of its clock is removed; arrival: stamped with "
+        "the time of arrival; auto: corrected only when latency cannot explain the offset",
+    )
+    max_offset_s: float = Field(
+        5.0, gt=0, description="further from the time of arrival it is refused; a radar's is corrected and said"
+    )
+    max_latency_s: float = Field(2.0, ge=0, description="so much behind is taken for latency, not for a wrong clock")
+
+
+class ClocksSettings(Section):
+    """The clocks of the sources that are not radars."""
+
+    reports: ClockSettings = ClockSettings()
+    nodes: ClockSettings = ClockSettings()
+
+
 class RadarSettings(Section):
     """One radar."""
 
@@ -59,6 +80,7 @@ class RadarSettings(Section):
     db_per_step: float = Field(0.3125, gt=0)
     blocks_per_scan: int = Field(32, ge=1, le=4096, description="sweeps are worked on in this many blocks a turn")
     simulated: bool = False
+    clock: ClockSettings = ClockSettings()
     udp: UdpSettings | None = UdpSettings()
 
 
@@ -156,6 +178,25 @@ class StorageSettings(Section):
     )
 
 
+class JournalSettings(Section):
+    """The journal: files from which everything that happened can be replayed bit for bit."""
+
+    folder: Path | None = Field(None, description="folder in which the journal is written; without it none is written")
+    max_file_mib: int = Field(256, ge=1, le=65536, description="a file larger than this is followed by a new one")
+    max_file_age_s: float = Field(
+        3600.0, ge=10, le=86400, description="a file older than this is followed by a new one"
+    )
+    max_total_mib: int = Field(20480, ge=2, description="the oldest files are removed so that all together stay below")
+    snapshot_every_s: float = Field(60.0, ge=1, le=3600, description="how often the state is recorded as a whole")
+    sweeps: bool = Field(False, description="record the raw sweeps of the radars too (several MB/s a radar)")
+    display: bool = Field(False, description="record what was sent to the displays too")
+
+    @field_validator("folder", mode="before")
+    @classmethod
+    def _empty_is_none(cls, value: Any) -> Any:
+        return None if value == "" else value
+
+
 class MqttSettings(Section):
     """Pavement nodes that speak MQTT."""
 
@@ -204,7 +245,9 @@ class Settings(BaseSettings):
     feed: FeedSettings = FeedSettings()
     limits: LimitsSettings = LimitsSettings()
     storage: StorageSettings = StorageSettings()
+    journal: JournalSettings = JournalSettings()
     mqtt: MqttSettings = MqttSettings()
+    clocks: ClocksSettings = ClocksSettings()
     demo: DemoSettings = DemoSettings()
 
     @property

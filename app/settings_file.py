@@ -55,15 +55,15 @@ def _lines() -> Iterator[str]:
             yield from _setting(name, field, name)
     for name, model in sections:
         yield from ("", *_prose(model.__doc__), f"[{name}]")
-        for key, field in model.model_fields.items():
-            yield from _setting(key, field, f"{name}.{key}")
+        yield from _table(name, model, "")
     for name, (model, meaning) in LISTS.items():
         yield from ("", f"# {meaning}", f"#[[{name}]]")
         yield from _table(name, model)
     yield from _parts()
 
 
-def _table(name: str, model: type[BaseModel]) -> Iterator[str]:
+def _table(name: str, model: type[BaseModel], sign: str = "#") -> Iterator[str]:
+    """The settings of a table and the tables in it. sign: before the heads of those."""
     inner: list[tuple[str, type[BaseModel]]] = []
     for key, field in model.model_fields.items():
         if isinstance(field.default, BaseModel):
@@ -71,7 +71,7 @@ def _table(name: str, model: type[BaseModel]) -> Iterator[str]:
         else:
             yield from _setting(key, field, f"{name}.{key}")
     for key, one in inner:
-        yield from (*_prose(one.__doc__), f"#[{name}.{key}]")
+        yield from (*_prose(one.__doc__), f"{sign}[{name}.{key}]")
         for below, field in one.model_fields.items():
             yield from _setting(below, field, f"{name}.{key}.{below}")
 

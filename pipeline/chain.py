@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipeline.bearing.of_plots import Expectations, PlotBearings
+from pipeline.bearing.of_plots import NOTHING_EXPECTED, Expectations, PlotBearings
 from pipeline.contracts.bearing import BearingEstimator
 from pipeline.contracts.detect import Detector
 from pipeline.contracts.extract import Extractor
@@ -148,6 +148,36 @@ class RadarChain:
             raise
         self._next_row, self._closed_to, self._scans_before = (int(one) for one in rows)
         self.time = float(time[0])
+
+    def save_whole(self) -> dict[str, NDArray[Any]]:
+        """save() with all else that the next plots depend on: the newest turn, and which plots got a bearing."""
+        bearings = self._bearings
+        place = (-1, 0) if bearings is None else bearings.place
+        expected = NOTHING_EXPECTED if bearings is None else bearings.expected
+        return {
+            **{name: _plain(array) for name, array in self.save().items()},
+            "whole.newest": self.newest.copy(),
+            "whole.place": np.array(place, np.int64),
+            "whole.expected": expected.table(),
+        }
+
+    def restore_whole(self, saved: Mapping[str, NDArray[Any]]) -> None:
+        """Take up what save_whole() gave: the same blocks then give the same plots. Raises StateError."""
+        newest, place, expected = (saved.get(f"whole.{one}") for one in ("newest", "place", "expected"))
+        if newest is None or place is None or expected is None or newest.shape != self.newest.shape:
+            raise StateError("the saved state is not whole, or of another video format")
+        mine = {name: array.dtype for name, array in self.save().items()}
+        kept = {name: array for name, array in saved.items() if not name.startswith("whole.")}
+        self.restore({name: _typed(array, mine.get(name)) for name, array in kept.items()})
+        self.newest[...] = newest
+        if self._bearings is not None:
+            self._bearings.place = (int(place[0]), int(place[1]))
+            self._bearings.expected = Expectations.of(*expected)
+
+    @property
+    def expected(self) -> NDArray[np.float64]:
+        """(4, n) what expect() was last given, as far as it is used: east, north, heading, sd."""
+        return (NOTHING_EXPECTED if self._bearings is None else self._bearings.expected).table()
 
     def resume(self, saved: Mapping[str, NDArray[Any]]) -> None:
         """Take up what the detector of save() had learned, and count rows and scans anew: for the start of a process.
@@ -331,6 +361,22 @@ def _pieces(block: Sweeps, most: int) -> Iterator[Sweeps]:
 
 def _under(prefix: str, saved: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     return {name.removeprefix(prefix): array for name, array in saved.items() if name.startswith(prefix)}
+
+
+def _plain(array: NDArray[Any]) -> NDArray[Any]:
+    """Records with named fields as their octets, (..., octets of one); other arrays as they are."""
+    if array.dtype.names is None:
+        return array
+    return np.ascontiguousarray(array)[..., None].view(np.uint8)
+
+
+def _typed(array: NDArray[Any], wanted: np.dtype[Any] | None) -> NDArray[Any]:
+    """What _plain() was given, whose dtype was `wanted`. Raises StateError when the octets are not so many."""
+    if wanted is None or wanted.names is None:
+        return array
+    if array.dtype != np.uint8 or array.ndim < 1 or array.shape[-1] != wanted.itemsize:
+        raise StateError(f"the saved state has records of another form than {wanted}")
+    return np.ascontiguousarray(array).view(wanted)[..., 0]
 
 
 def _numbers(saved: Mapping[str, NDArray[Any]], name: str, many: int) -> NDArray[Any]:

@@ -91,7 +91,8 @@ class SensorState:
     """The health of one sensor. status: "ok", "degraded", "silent" or "waiting" (nothing heard since start).
 
     counters: what it delivered and what was dropped, by reason; they only grow. parts: of a radar, the methods that
-    work on its video, by verb.
+    work on its video, by verb. clock_offset_s: the times that it states less those of their arrival, with the least
+    latency; None when unknown. clock_spread_s: how far single seconds lie from that.
     """
 
     id: str
@@ -102,6 +103,8 @@ class SensorState:
     detail: str = ""
     counters: dict[str, int] = field(default_factory=dict)
     parts: dict[str, str] = field(default_factory=dict)
+    clock_offset_s: float | None = None
+    clock_spread_s: float | None = None
 
 
 @dataclass(frozen=True)

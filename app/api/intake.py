@@ -14,6 +14,7 @@ from starlette.responses import Response
 from app.api import models
 from app.api.context import Context, answer, problems
 from app.api.problems import ApiProblem
+from app.contract import RefusedTime
 from app.ingest import octets
 from app.ingest.node_events import NodeEventRow, parse_node_events
 from app.ingest.target_reports import TargetReportRow, parse_target_reports
@@ -47,11 +48,13 @@ def intake_router(context: Context) -> APIRouter:
         openapi_extra=_json_body(NodeEventRow, limits.node_events_per_request),
     )
     async def node_events(request: Request) -> Response:
-        """Events of the nodes in the pavement, one object or an array; nothing is taken when one is wrong."""
+        """Events of the nodes in the pavement, one object or an array; nothing is taken when one is wrong.
+
+        Events whose time is too far from that of their arrival are refused and counted by reason, the others taken.
+        """
         body = await _body(request, JSON)
         events = _parsed(lambda: parse_node_events(body, service.nodes, limits.node_events_per_request))
-        await run_in_threadpool(context.ask, lambda: service.submit_node_events(events), 503)
-        return answer({"taken": len(events)})
+        return answer(await run_in_threadpool(_submitted, context, lambda: service.submit_node_events(events)))
 
     @router.post(
         "/targets/reports",
@@ -60,12 +63,14 @@ def intake_router(context: Context) -> APIRouter:
         openapi_extra=_json_body(TargetReportRow, limits.node_events_per_request),
     )
     async def target_reports(request: Request) -> Response:
-        """Positions that cooperative sensors give (ADS-B, multilateration, vehicle beacons)."""
+        """Positions that cooperative sensors give (ADS-B, multilateration, vehicle beacons).
+
+        Reports whose time is too far from that of their arrival are refused and counted by reason, the others taken.
+        """
         body = await _body(request, JSON)
         frame, limit = service.airport.frame, limits.node_events_per_request
         reports = _parsed(lambda: parse_target_reports(body, frame, limit))
-        await run_in_threadpool(context.ask, lambda: service.submit_target_reports(reports), 503)
-        return answer({"taken": len(reports)})
+        return answer(await run_in_threadpool(_submitted, context, lambda: service.submit_target_reports(reports)))
 
     return router
 
@@ -75,6 +80,17 @@ async def _body(request: Request, media_type: str) -> bytes:
     if given != media_type:
         raise ApiProblem(415, f"content type {media_type} wanted", headers={"Accept": media_type})
     return await request.body()
+
+
+def _submitted(context: Context, work: Callable[[], dict[str, int]]) -> dict[str, int]:
+    """What was taken and refused. Raises ApiProblem: 422 when all is refused for its time, 503 for want of room."""
+    try:
+        counted: dict[str, int] = context.ask(work, 503)
+    except ApiProblem as error:
+        if isinstance(error.__cause__, RefusedTime):
+            raise ApiProblem(422, str(error.__cause__)) from error
+        raise
+    return counted
 
 
 def _parsed(work: Callable[[], Any]) -> Any:

@@ -63,6 +63,9 @@ class ServiceCollector(Collector):
         status = GaugeMetricFamily(
             "airside_sensor_status", "1 for the state a sensor is in", labels=["sensor", "status"]
         )
+        offset = GaugeMetricFamily(
+            "airside_sensor_clock_offset_seconds", "a sensor's clock less the time of arrival", labels=["sensor"]
+        )
         last = GaugeMetricFamily("airside_sensor_last_seconds", "Unix time of the newest data", labels=["sensor"])
         for sensor in self.context.service.sensors():
             for reason, count in sensor.counters.items():
@@ -71,7 +74,9 @@ class ServiceCollector(Collector):
                 status.add_metric([sensor.id, name], float(sensor.status == name))
             if sensor.last is not None:
                 last.add_metric([sensor.id], sensor.last)
-        yield from (counts, status, last)
+            if sensor.clock_offset_s is not None:
+                offset.add_metric([sensor.id], sensor.clock_offset_s)
+        yield from (counts, status, last, offset)
 
     def _feed(self) -> Iterator[Metric]:
         hub = self.context.hub

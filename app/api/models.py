@@ -141,6 +141,10 @@ class Sensor(Model):
         description="of a radar, the methods that work on its video, by verb",
         examples=[{"detect": "adaptive", "extract": "manhattan"}],
     )
+    clock_offset_s: float | None = Field(
+        description="the times that it states less those of their arrival, with the least latency; null when unknown"
+    )
+    clock_spread_s: float | None = Field(description="how far the offsets of single seconds lie apart")
 
 
 class RunwayUse(Model):

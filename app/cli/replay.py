@@ -1,4 +1,4 @@
-"""`airside replay`: send a recording of radar video to the service, or look at its plots."""
+"""`airside replay`: send a recording of radar video to a running service, or replay a journal."""
 
 from __future__ import annotations
 
@@ -14,31 +14,62 @@ if TYPE_CHECKING:
     from app.settings import RadarSettings, Settings
 
 
+File = Annotated[
+    Path,
+    typer.Argument(
+        help="A journal (.mcap, or the folder of one), or radar video: .npz (scans, t), a folder of polar PNGs with a"
+        " YAML, .pcap, .pcapng."
+    ),
+]
+Headless = Annotated[
+    bool, typer.Option("--headless", help="Serve and send nothing: print what the engine or the detector makes of it.")
+]
+Speed = Annotated[float, typer.Option(min=0.01, max=1000, help="So many times the recorded pace.")]
+Verify = Annotated[
+    bool, typer.Option("--verify", help="Journal, with --headless: compare every bit with what was recorded.")
+]
+From = Annotated[str | None, typer.Option("--from", metavar="T", help="Journal: not before (ISO 8601, s, or +s).")]
+Until = Annotated[str | None, typer.Option("--until", metavar="T", help="Journal: not after, in the same forms.")]
+Change = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Journal: as in parts.lifecycle=m_of_n.")
+]
+HttpPort = Annotated[int, typer.Option("--http-port", min=0, max=65535, help="Journal: where displays are served.")]
+Radar = Annotated[str | None, typer.Option(help="Video: the radar of the settings it stands for; the first if none.")]
+To = Annotated[str | None, typer.Option(help="Video: udp://host:port; the radar's own port on this machine if none.")]
+Loop = Annotated[bool, typer.Option("--loop", help="Video: begin again at the end.")]
+Port = Annotated[int | None, typer.Option(min=1, max=65535, help="Video: take only this UDP port of a capture.")]
+SettingsFile = Annotated[
+    Path | None, typer.Option("--settings", "-s", envvar="AIRSIDE_SETTINGS", help="Video: settings of the service.")
+]
+
+
 def register(app: typer.Typer) -> None:
     """Add the command."""
     app.command()(replay)
 
 
 def replay(
-    file: Annotated[
-        Path, typer.Argument(help=".npz (scans, t), a folder of polar PNGs with a YAML, .pcap or .pcapng.")
-    ],
-    radar: Annotated[
-        str | None, typer.Option(help="Which radar of the settings it stands in for; the first if none.")
-    ] = None,
-    speed: Annotated[float, typer.Option(min=0.01, max=1000, help="So many times the recorded pace.")] = 1.0,
-    to: Annotated[
-        str | None, typer.Option(help="udp://host:port; the radar's own port on this machine if none.")
-    ] = None,
-    headless: Annotated[bool, typer.Option("--headless", help="Send nothing; print the plots of each turn.")] = False,
-    loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end.")] = False,
-    port: Annotated[int | None, typer.Option(min=1, max=65535, help="Take only this UDP port of a capture.")] = None,
-    settings: Annotated[
-        Path | None, typer.Option("--settings", "-s", envvar="AIRSIDE_SETTINGS", help="Settings of the service.")
-    ] = None,
+    file: File,
+    headless: Headless = False,
+    speed: Speed = 1.0,
+    verify: Verify = False,
+    begin: From = None,
+    until: Until = None,
+    change: Change = None,
+    http_port: HttpPort = 8000,
+    radar: Radar = None,
+    to: To = None,
+    loop: Loop = False,
+    port: Port = None,
+    settings: SettingsFile = None,
 ) -> None:
-    """Send a recording as ASTERIX CAT240 to a running service, as if the radar were turning now.
+    """Replay a journal, or send recorded radar video to a running service.
 
+    [bold]airside replay day.mcap[/bold] serves the displays with the picture of that day, to play, pause and seek;
+    [bold]airside replay day.mcap --headless --verify[/bold] proves that the same inputs give the same bits;
+    [bold]airside replay day.mcap --headless --set parts.lifecycle=m_of_n[/bold] says what would have been different.
+
+    Radar video is sent as ASTERIX CAT240, as if the radar were turning now:
     [bold]airside replay turns.npz[/bold] sends to the first radar of the settings on this machine;
     [bold]airside replay turns.pcap --to udp://239.1.2.3:8600[/bold] to wherever you say;
     [bold]airside replay turns.npz --headless[/bold] prints what the detector makes of it.
@@ -46,27 +77,81 @@ def replay(
     from rich.console import Console
 
     from app.console import fail
+    from app.replay.command import is_journal
+
+    console = Console()
+    if is_journal(file):
+        _replay_journal(console, file, speed, headless, verify, (begin, until), tuple(change or ()), http_port)
+    elif verify or begin or until or change:
+        raise fail(f"{file}: --verify, --from, --until and --set are for journals (.mcap)")
+    else:
+        _replay_video(console, file, speed, headless, (radar, to), loop, port, settings)
+
+
+def _replay_video(
+    console: Console,
+    file: Path,
+    speed: float,
+    headless: bool,
+    destination: tuple[str | None, str | None],
+    loop: bool,
+    port: int | None,
+    settings: Path | None,
+) -> None:
+    from app.console import fail
     from app.contract import Refused
     from app.ingest.recordings import open_recording
     from app.settings import SettingsError, load
 
-    console = Console()
     try:
         recording = open_recording(file, port=port)
         _describe(console, recording)
         loaded = load(settings)
         if headless:
             _print_plots(console, recording, loaded)
-        else:
-            address, chosen = _destination(loaded, radar, to)
-            if chosen is not None and to is None:
-                _must_fit(recording, chosen)
-            interface = chosen.udp.interface if chosen is not None and chosen.udp is not None else "0.0.0.0"
-            _send(console, recording, address, interface, speed, loop)
+            return
+        radar, to = destination
+        address, chosen = _destination(loaded, radar, to)
+        if chosen is not None and to is None:
+            _must_fit(recording, chosen)
+        interface = chosen.udp.interface if chosen is not None and chosen.udp is not None else "0.0.0.0"
+        _send(console, recording, address, interface, speed, loop)
     except (Refused, SettingsError, OSError) as error:
         raise fail(str(error)) from error
     except KeyboardInterrupt:
         raise typer.Exit(130) from None
+
+
+def _replay_journal(
+    console: Console,
+    path: Path,
+    speed: float,
+    headless: bool,
+    verify: bool,
+    times: tuple[str | None, str | None],
+    change: tuple[str, ...],
+    port: int,
+) -> None:
+    from app.console import fail
+    from app.journal.names import JournalError
+    from app.replay.command import JournalReplay
+    from app.settings import SettingsError
+
+    try:
+        work = JournalReplay(console, path, times, change)
+        if verify and (change or not headless):
+            raise SettingsError("--verify goes with --headless, and not with --set")
+        if verify:
+            status = work.verify()
+        elif headless:
+            status = work.compare()
+        else:
+            status = work.serve(port, speed)
+    except (JournalError, SettingsError, OSError) as error:
+        raise fail(str(error)) from error
+    except KeyboardInterrupt:
+        raise typer.Exit(130) from None
+    raise typer.Exit(status)
 
 
 def _describe(console: Console, recording: Recording) -> None:

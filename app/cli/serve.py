@@ -14,6 +14,11 @@ SettingsFile = Annotated[
 Port = Annotated[int | None, typer.Option("--port", "-p", help="HTTP port; 8000 unless AIRSIDE_PORT says otherwise.")]
 Host = Annotated[str | None, typer.Option("--host", help="Address to listen on.")]
 
+Record = Annotated[
+    Path | None,
+    typer.Option("--record", metavar="DIR", help="Write a journal there; see [bold]airside replay[/bold]."),
+]
+
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
@@ -21,23 +26,23 @@ def register(app: typer.Typer) -> None:
     app.command()(demo)
 
 
-def serve(settings: SettingsFile = None, port: Port = None, host: Host = None) -> None:
+def serve(settings: SettingsFile = None, port: Port = None, host: Host = None, record: Record = None) -> None:
     """Run the service on your own sensors, as the settings file says.
 
     Radar video is awaited as ASTERIX CAT240 over UDP on each radar's port; everything else comes and goes over HTTP.
     """
-    _run(settings, "live", port, host)
+    _run(settings, "live", port, host, record)
 
 
-def demo(settings: SettingsFile = None, port: Port = None, host: Host = None) -> None:
+def demo(settings: SettingsFile = None, port: Port = None, host: Host = None, record: Record = None) -> None:
     """Run the demonstration: Paris-Orly, recorded movements as simulated radar video, an incident every 90 s.
 
     The simulator sends CAT240 datagrams to the same UDP port that a real radar would use.
     """
-    _run(settings, "demo", port, host)
+    _run(settings, "demo", port, host, record)
 
 
-def _run(path: Path | None, mode: str, port: int | None, host: str | None) -> None:
+def _run(path: Path | None, mode: str, port: int | None, host: str | None, record: Path | None) -> None:
     from rich.console import Console
 
     from app.console import fail
@@ -47,6 +52,8 @@ def _run(path: Path | None, mode: str, port: int | None, host: str | None) -> No
     console = Console(stderr=False)
     try:
         settings = load(path, **{key: value for key, value in overrides.items() if value is not None})
+        if record is not None:
+            settings = settings.model_copy(update={"journal": settings.journal.model_copy(update={"folder": record})})
         if mode == "demo":
             from app.demo import demo_settings
 

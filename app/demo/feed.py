@@ -6,7 +6,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,10 +42,10 @@ class Taker(Protocol):
     radars: tuple[RadarSite, ...]
     nodes: tuple[NodeSite, ...]
 
-    def submit_node_events(self, events: NodeEvents) -> None:
+    def submit_node_events(self, events: NodeEvents) -> Any:
         """Take node events."""
 
-    def submit_target_reports(self, reports: TargetReports) -> None:
+    def submit_target_reports(self, reports: TargetReports) -> Any:
         """Take target reports."""
 
 
@@ -193,7 +193,7 @@ class DemoFeed:
             reports, self._waiting_reports = self._waiting_reports[ready], self._waiting_reports[~ready]
             self._submit("target_reports", len(reports), lambda: self.service.submit_target_reports(reports))
 
-    def _submit(self, name: str, count: int, act: Callable[[], None]) -> None:
+    def _submit(self, name: str, count: int, act: Callable[[], Any]) -> None:
         try:
             act()
             self._counters[name] += count

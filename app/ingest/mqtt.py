@@ -7,13 +7,13 @@ import logging
 import random
 import threading
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 from urllib.parse import unquote, urlsplit
 
 import aiomqtt
 
-from app.contract import Refused
+from app.contract import Refused, RefusedTime
 from app.ingest.node_events import parse_node_events
 from app.ingest.wire_json import BadMessage
 from app.settings import MqttSettings
@@ -28,13 +28,13 @@ MESSAGE_LIMIT = 1000
 MESSAGE_BYTES = 256 * 1024
 QUEUED = 10_000
 
-Submit = Callable[[NodeEvents], None]
+Submit = Callable[[NodeEvents], Mapping[str, int]]
 
 
 class _Service(Protocol):
     nodes: tuple[NodeSite, ...]
 
-    def submit_node_events(self, events: NodeEvents) -> None: ...
+    def submit_node_events(self, events: NodeEvents) -> dict[str, int]: ...
 
 
 async def listen(
@@ -162,13 +162,17 @@ def _take(
         if len(body) > MESSAGE_BYTES:
             raise BadMessage("too_many", f"{len(body)} octets in one message; at most {MESSAGE_BYTES} are taken")
         events = parse_node_events(body, nodes, MESSAGE_LIMIT, node=node_of_topic(topic, pattern))
-        submit(events)
+        submitted = submit(events)
     except BadMessage as error:
         _note(error.reason, topic, error, counted)
+    except RefusedTime as error:
+        counted["events_refused"] += len(events)
+        _note("refused_time", topic, error, counted)
     except Refused as error:
         _note("refused", topic, error, counted)
     else:
-        counted["events"] += len(events)
+        counted["events"] += submitted["taken"]
+        counted["events_refused"] += len(events) - submitted["taken"]
 
 
 def _note(reason: str, topic: str, error: Exception, counted: Counter[str]) -> None:

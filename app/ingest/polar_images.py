@@ -30,7 +30,7 @@ from app.ingest.recording import (
     turns_of,
     video_format,
 )
-from app.ingest.wire_json import unix_time
+from app.ingest.wire_json import recorded_time
 from pipeline.sites import RadarSite
 from pipeline.tables import Sweeps
 
@@ -98,7 +98,7 @@ def _moment(path: Path, value: Any) -> float:
             value = value.isoformat()
         if isinstance(value, bool) or not isinstance(value, int | float | str):
             raise RecordingError(f"{path}: {value!r} is not a time")
-        return unix_time(value, str(path))
+        return recorded_time(value, str(path))
     except Refused as error:
         raise RecordingError(str(error)) from error
 

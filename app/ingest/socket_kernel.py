@@ -16,12 +16,14 @@ import numpy as np
 from numba.core import typing as numba_typing
 from numpy.typing import NDArray
 
+from pipeline.kernels.compiled import allocating
+
 AVAILABLE = sys.platform == "linux" and ctypes.sizeof(ctypes.c_void_p) == 8
 """This system has recvmmsg with the layout used here."""
 
 MSG_TRUNC = 0x20
 _WAIT_FOR_ONE = 0x10000
-_REALTIME = 0
+_MONOTONIC = 1
 _CONTROL = 64
 _OVERFLOW = 40
 """SO_RXQ_OVFL: level SOL_SOCKET (1), the count of datagrams that the socket has dropped."""
@@ -50,8 +52,9 @@ _AGAIN, _INTERRUPTED = errno.EAGAIN, errno.EINTR
 class Ring:
     """Room for `count` datagrams of at most `width` octets.
 
-    data: (count, width) uint8. lengths: (count,) int32, at most the width. arrival: (count,) float64 UTC seconds.
-    truncated: (count,) bool, the datagram was longer. After `receive` the first so many rows are filled. dropped:
+    data: (count, width) uint8. lengths: (count,) int32, at most the width. arrival: (count,) float64 s of
+    `time.monotonic`. truncated: (count,) bool, the datagram was longer. After `receive` the first so many rows are
+    filled. dropped:
     datagrams that the socket had no room for since it was opened, modulo 2**32.
     """
 
@@ -95,7 +98,7 @@ class Ring:
                 self.dropped = int(self._control[row, 16:20].view(np.uint32)[0])
 
 
-@numba.njit(nogil=True, cache=True)
+@allocating
 def _receive(descriptor, headers, address, hold_s, clock, clock_address, out):  # type: ignore[no-untyped-def]
     lengths, truncated, arrival = out
     room = headers.shape[0]
@@ -113,7 +116,7 @@ def _receive(descriptor, headers, address, hold_s, clock, clock_address, out):  
             if error == _AGAIN or count > 0:
                 break
             return -error
-        _clock_gettime(_REALTIME, clock_address)
+        _clock_gettime(_MONOTONIC, clock_address)
         now = clock[0] + clock[1] * 1e-9
         for i in range(count, count + got):
             arrival[i] = now

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.ingest import socket_kernel
+from app.runtime.host_clock import HostClock
 from app.settings import RadarSettings, UdpSettings
 from pipeline.assemble import Assembler
 from pipeline.asterix.cat240_batch import FIELDS, VideoBatch
@@ -53,12 +54,17 @@ class _Receiving(Protocol):
 class VideoReceiver:
     """Receives, decodes and assembles in its own thread; `deliver` is called there with every block and must not wait.
 
-    last_heard: `time.monotonic()` of the newest datagram, None before the first. Raises ValueError when the radar has
-    no `udp` settings.
+    clock: of the time of arrival. last_heard: `time.monotonic()` of the newest datagram, None before the first. Raises
+    ValueError when the radar has no `udp` settings.
     """
 
     def __init__(
-        self, site: RadarSite, index: int, radar_settings: RadarSettings, deliver: Callable[[Sweeps], None]
+        self,
+        site: RadarSite,
+        index: int,
+        radar_settings: RadarSettings,
+        deliver: Callable[[Sweeps], None],
+        clock: HostClock | None = None,
     ) -> None:
         if radar_settings.udp is None:
             raise ValueError(f"radar {radar_settings.id} has no udp settings")
@@ -66,6 +72,7 @@ class VideoReceiver:
         self.last_heard: float | None = None
         self._udp = radar_settings.udp
         self._deliver = deliver
+        self._clock = clock if clock is not None else HostClock()
         self._assembler = Assembler(
             site, index, min(radar_settings.blocks_per_scan, site.video.azimuths), sac=self._udp.sac, sic=self._udp.sic
         )
@@ -124,7 +131,7 @@ class VideoReceiver:
     def _take(self, ring: _Receiving, got: int) -> None:
         self.last_heard = time.monotonic()
         counts, lengths, truncated = self._counts, ring.lengths[:got], ring.truncated[:got]
-        data, arrival = ring.data[:got], ring.arrival[:got]
+        data, arrival = ring.data[:got], self._clock.at(ring.arrival[:got])
         counts["datagrams"] += got
         counts["octets"] += int(lengths.sum())
         counts["socket_overflow"] = ring.dropped
@@ -176,7 +183,7 @@ class PlainRing:
                 size = self._socket.recv_into(self._spare)
             except TimeoutError:
                 return row
-            now = time.time()
+            now = time.monotonic()
             begun = begun if row else now
             kept = min(size, width)
             self.data[row, :kept] = np.frombuffer(self._spare, np.uint8, kept)

@@ -10,13 +10,13 @@ import msgspec
 
 from app.contract import Refused
 
-EARLIEST = 946684800.0
-"""2000-01-01 UTC: anything before is a sensor whose clock was never set."""
-
-LATEST = 4102444800.0
-"""2100-01-01 UTC."""
+EARLIEST, LATEST = 946684800.0, 4102444800.0
+"""2000-01-01 and 2100-01-01 UTC: no recording is of another time."""
 
 MAX_TEXT_ECHO = 40
+
+MOST_S = 1e300
+"""Greater numbers are no times in any unit."""
 
 Row = TypeVar("Row", bound=msgspec.Struct)
 
@@ -48,7 +48,10 @@ def decode_rows(body: bytes, kind: type[Row], limit: int) -> list[Row]:
 
 
 def unix_time(value: float | int | str, where: str) -> float:
-    """UTC seconds of a Unix time in seconds or an ISO 8601 time with its zone. Raises BadMessage."""
+    """UTC seconds of a Unix time in seconds or an ISO 8601 time with its zone. Raises BadMessage.
+
+    Whether the clock that it comes from can be right is judged when the row is submitted, by the time of its arrival.
+    """
     if isinstance(value, str):
         try:
             moment = datetime.fromisoformat(value)
@@ -59,11 +62,15 @@ def unix_time(value: float | int | str, where: str) -> float:
         if moment.tzinfo is None:
             raise BadMessage("bad_value", f"{where}: time {value[:MAX_TEXT_ECHO]!r} has no zone; end it with Z")
         try:
-            seconds = moment.timestamp()
+            return moment.timestamp()
         except (OverflowError, ValueError) as error:
             raise BadMessage("bad_value", f"{where}: time {value[:MAX_TEXT_ECHO]!r} is out of range") from error
-    else:
-        seconds = number(value, "time", where, -math.inf, math.inf)
+    return number(value, "time", where, -MOST_S, MOST_S)
+
+
+def recorded_time(value: float | int | str, where: str) -> float:
+    """`unix_time` of a recording, which nobody else judges: between the years 2000 and 2100. Raises BadMessage."""
+    seconds = unix_time(value, where)
     if not EARLIEST <= seconds < LATEST:
         raise BadMessage("bad_value", f"{where}: time must lie between the years 2000 and 2100 (Unix seconds, UTC)")
     return seconds

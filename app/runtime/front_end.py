@@ -35,7 +35,7 @@ class FrontEndSwitch:
     """One radar's parts: what runs, what learns to take over, and how to change it. Any thread may call.
 
     index: the radar's place in the engine. surface: what `RadarChain` takes. compile: called with parts before they are
-    built, so that their kernels lie in the cache.
+    built, so that their kernels lie in the cache. changed: hears of each verb's part once others have taken over.
     """
 
     def __init__(
@@ -44,11 +44,13 @@ class FrontEndSwitch:
         index: int,
         surface: NDArray[np.uint8] | None,
         compile: Callable[[Mapping[str, Mapping[str, Any]]], None],
+        changed: Callable[[dict[str, Any]], None] = lambda _: None,
     ) -> None:
         self._worker = worker
         self._index = index
         self._surface = surface
         self._compile = compile
+        self._changed = changed
         self._next: dict[str, Any] | None = None
         self._changing = threading.Lock()
         self._room = threading.BoundedSemaphore(MOST_CHANGES)
@@ -135,6 +137,7 @@ class FrontEndSwitch:
             new, old = ({verb: which[verb] for verb in changed} for which in (made, before))
             settings = "; ".join(map(repr, new.values()))
             log.info("radar %s: %s in place of %s: %s", self._worker.site.id, _words(new), _words(old), settings)
+            self._changed(_described(made))
 
 
 def _built(wanted: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:

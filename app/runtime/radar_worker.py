@@ -45,10 +45,18 @@ class Successor:
 class RadarWorker:
     """Runs a chain on the blocks put into its queue and hands each sector on.
 
-    Only its thread touches the chain: what others want of it goes through `ask` and `succeed`.
+    Only its thread touches the chain: what others want of it goes through `ask` and `succeed`. record: hears of every
+    block just before the chain works on it.
     """
 
-    def __init__(self, site: RadarSite, chain: RadarChain, limit: int, deliver: Callable[[SectorPlots], bool]) -> None:
+    def __init__(
+        self,
+        site: RadarSite,
+        chain: RadarChain,
+        limit: int,
+        deliver: Callable[[SectorPlots], bool],
+        record: Callable[[RadarChain, Sweeps], None] = lambda _chain, _block: None,
+    ) -> None:
         self.site = site
         self.chain = chain
         self.queue = BlockQueue(limit)
@@ -61,6 +69,7 @@ class RadarWorker:
         self.successions = 0
         self.scans_left: int | None = None
         self._deliver = deliver
+        self._record = record
         self._turning = Turn()
         self._successor: Successor | None = None
         self._orders: deque[Callable[[], None]] = deque()
@@ -163,6 +172,7 @@ class RadarWorker:
     def _work(self, block: Sweeps) -> None:
         self._attempt(lambda: self._bring_up(block))
         try:
+            self._record(self.chain, block)
             sector = self.chain.process(block)
         except Exception:
             self.failures += 1

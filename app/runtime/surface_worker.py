@@ -1,4 +1,4 @@
-"""The surface thread: sectors, events, reports and commands in, pictures and alert changes out."""
+"""The surface thread: what arrives goes into the engine in one order; pictures and alert changes come out."""
 
 from __future__ import annotations
 
@@ -8,38 +8,47 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 from app.contract import PictureListener, Refused
+from app.runtime.host_clock import HostClock
 from app.runtime.queues import Closed, Inbox
-from pipeline.engine import SurfaceEngine
+from pipeline.engine import Outcome, SurfaceEngine
+from pipeline.inputs import ClockStep, Command, Envelope, Input, SensorHealth, Tick
 from pipeline.picture import AlertChange, Picture, SensorState
-from pipeline.tables import NodeEvents, SectorPlots, TargetReports
 
 log = logging.getLogger(__name__)
 
-IDLE_S = 0.25
-"""Without input a picture is made this often, so that ages, coasting and health stay true."""
-
-SILENCE_S = 1.0
-"""When no sensor has spoken for so long, time passes without them; what they say next may be as old as the jitter."""
-
-JITTER_S = 0.5
+TICK_S = 0.25
+"""Time passes for the engine this often though no sensor speaks, so that ages, coasting and health stay true."""
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
-    """Work on the engine asked for by another thread, answered through a future."""
+class Waiting:
+    """What waits for the thread. answer: where a command is answered; None for everything else."""
 
-    work: Callable[[SurfaceEngine], Any]
-    answer: Future[Any]
+    envelope: Envelope
+    answer: Future[Any] | None = None
+
+
+class Recorder(Protocol):
+    """What hears of everything that enters the engine and of everything that comes out, in order (`app.journal`)."""
+
+    def before(self, envelope: Envelope, save: Callable[[], Any]) -> None:
+        """`envelope` is about to enter. save: gives the engine's state before it."""
+
+    def after(self, outcome: Outcome) -> None:
+        """That is what came of it."""
+
+    def sensors(self, states: tuple[SensorState, ...]) -> None:
+        """The health of all sensors, as it goes out with the newest picture."""
 
 
 class SurfaceWorker:
     """Owns the engine: nobody else touches it.
 
-    Called once a picture: `sensors` for their health, `timings` for those of the radars, and `expect` with the picture,
-    to tell the radars what comes.
+    sensors: asked for the health of all once a picture. timings: those of the radars. expect: hears of each picture,
+    to tell the radars what comes. recorder: hears of all inputs and outcomes.
     """
 
     def __init__(
@@ -49,19 +58,23 @@ class SurfaceWorker:
         limit: int,
         timings: Callable[[], dict[str, float]] = dict,
         expect: Callable[[Picture], None] = lambda _: None,
+        clock: HostClock | None = None,
+        recorder: Recorder | None = None,
     ) -> None:
         self.engine = engine
-        self.inbox: Inbox[SectorPlots | NodeEvents | TargetReports | Command] = Inbox(limit)
+        self.inbox: Inbox[Waiting] = Inbox(limit)
         self.newest: Picture | None = None
         self.failures = 0
+        self._clock = clock or HostClock()
+        self._recorder = recorder
         self._sensors = sensors
         self._timings = timings
         self._expect = expect
         self._listeners: list[PictureListener] = []
         self._listening = threading.Lock()
         self._thread = threading.Thread(target=self._run, name="surface", daemon=True)
-        self._heard: tuple[float, float] | None = None
-        self._pending: list[AlertChange] = []
+        self._degraded: tuple[str, ...] = ()
+        self._ticked = 0.0
 
     def start(self) -> None:
         """Begin."""
@@ -90,15 +103,19 @@ class SurfaceWorker:
 
         return end
 
-    def ask(self, work: Callable[[SurfaceEngine], Any], timeout: float = 5.0) -> Any:
-        """Do `work` in the surface thread and give its result; its exception is raised here.
+    def offer(self, body: Input) -> bool:
+        """Give the engine an input, stamped with the time of now. False, counted, when the queue is full."""
+        return self.inbox.offer(Waiting(Envelope(self._clock.now(), body)))
+
+    def ask(self, command: Command, timeout: float = 5.0) -> Any:
+        """Have the engine carry out a command, and give its answer; why it could not is raised (KeyError, ValueError).
 
         Raises Refused when the thread does not run, takes no more, or does not answer in `timeout` seconds.
         """
         answer: Future[Any] = Future()
         if not self.alive:
             raise Refused("the service is starting or ending")
-        if not self.inbox.offer(Command(work, answer)):
+        if not self.inbox.offer(Waiting(Envelope(self._clock.now(), command), answer)):
             raise Refused("the queue for commands is full")
         try:
             return answer.result(timeout)
@@ -107,75 +124,91 @@ class SurfaceWorker:
                 raise Refused(f"no answer within {timeout:g} s; nothing was done") from error
             raise Refused(f"no answer within {timeout:g} s; it may still be done") from error
 
-    def record_change(self, change: AlertChange) -> None:
-        """A change made by a command (an acknowledgement): goes out with the next picture. Surface thread only."""
-        self._pending.append(change)
-
     def _run(self) -> None:
         while True:
             try:
-                items = self.inbox.take_all(IDLE_S)
+                waiting = self.inbox.take_all(TICK_S)
             except Closed:
                 return
-            for item in items:
-                self._take(item)
-            self._let_time_pass(any(not isinstance(item, Command) for item in items))
-            self._look()
+            sensors = self._health()
+            outcomes = [outcome for one in waiting if (outcome := self._take(one)) is not None]
+            outcomes += self._tick()
+            self._publish(outcomes, sensors)
 
-    def _take(self, item: SectorPlots | NodeEvents | TargetReports | Command) -> None:
-        try:
-            if isinstance(item, Command):
-                self._answer(item)
-            elif isinstance(item, SectorPlots):
-                self.engine.sector(item)
-            elif isinstance(item, NodeEvents):
-                self.engine.node_events(item)
-            else:
-                self.engine.target_reports(item)
-        except Exception:
-            self.failures += 1
-            log.exception("the surface engine could not take a %s", type(item).__name__)
-
-    def _answer(self, command: Command) -> None:
-        if not command.answer.set_running_or_notify_cancel():
-            return
-        try:
-            command.answer.set_result(command.work(self.engine))
-        except Exception as error:
-            command.answer.set_exception(error)
-
-    def _let_time_pass(self, heard: bool) -> None:
-        """The engine's time comes with the data; only when all sensors are silent does this clock take over."""
-        now = time.monotonic()
-        if heard or self._heard is None:
-            self._heard = (now, self.engine.time) if self.engine.time else None
-        elif now - self._heard[0] > SILENCE_S:
-            self.engine.advance(self._heard[1] + now - self._heard[0] - JITTER_S)
-
-    def _look(self) -> None:
+    def _health(self) -> tuple[SensorState, ...] | None:
+        """The state of all sensors; what the alert rules must know of it goes into the engine when it changes."""
         try:
             sensors = self._sensors()
-            self.engine.sensors_degraded = any(s.kind == "radar" and s.status != "ok" for s in sensors)
-            picture, changes = self.engine.look()
         except Exception:
-            self.failures += 1
-            log.exception("no picture could be made")
+            self._failed("the sensors could not be asked")
+            return None
+        degraded = tuple(one.id for one in sensors if one.kind == "radar" and one.status != "ok")
+        if degraded != self._degraded and self._step(Envelope(self._clock.now(), SensorHealth(degraded))) is not None:
+            self._degraded = degraded
+        return sensors
+
+    def _tick(self) -> list[Outcome]:
+        now, made = time.monotonic(), []
+        step = self._clock.take_step()
+        if step:
+            log.warning("the clock of this host was set by %+.1f s; the picture goes on with it", step)
+            made.append(self._step(Envelope(self._clock.now(), ClockStep(step))))
+        if now - self._ticked >= TICK_S:
+            self._ticked = now
+            made.append(self._step(Envelope(self._clock.now(), Tick())))
+        return [one for one in made if one is not None]
+
+    def _take(self, waiting: Waiting) -> Outcome | None:
+        answer = waiting.answer
+        if answer is None:
+            return self._step(waiting.envelope)
+        if not answer.set_running_or_notify_cancel():
+            return None
+        outcome = self._step(waiting.envelope)
+        if outcome is None:
+            answer.set_exception(Refused("the command failed; the log of the service says why"))
+        elif outcome.refused is not None:
+            answer.set_exception(outcome.refused)
+        else:
+            answer.set_result(outcome.answer)
+        return outcome
+
+    def _step(self, envelope: Envelope) -> Outcome | None:
+        """Put one input into the engine; None, counted and logged, when that failed."""
+        try:
+            if self._recorder is not None:
+                self._recorder.before(envelope, self.engine.save)
+            outcome = self.engine.step(envelope)
+            if self._recorder is not None:
+                self._recorder.after(outcome)
+        except Exception:
+            self._failed(f"the surface engine could not take a {type(envelope.body).__name__}")
+            return None
+        return outcome
+
+    def _publish(self, outcomes: list[Outcome], sensors: tuple[SensorState, ...] | None) -> None:
+        """Send the newest picture on, with every alert change since the one before: of pictures the newest wins."""
+        changes: tuple[AlertChange, ...] = tuple(change for one in outcomes for change in one.changes)
+        newest = next((one.picture for one in reversed(outcomes) if one.picture is not None), None)
+        if newest is None:
             return
-        now = picture.time or time.time()
-        picture = replace(picture, time=now, sensors=sensors, timings={**self._timings(), **picture.timings})
+        known = sensors if sensors is not None else (self.newest.sensors if self.newest is not None else ())
+        picture = replace(newest, sensors=known, timings={**self._timings(), **newest.timings})
         self.newest = picture
+        if self._recorder is not None:
+            self._recorder.sensors(known)
         try:
             self._expect(picture)
         except Exception:
-            self.failures += 1
-            log.exception("the radars could not be told what to expect")
-        changes = (*self._pending, *changes)
-        self._pending.clear()
+            self._failed("the radars could not be told what to expect")
         with self._listening:
             listeners = tuple(self._listeners)
         for listener in listeners:
             try:
                 listener(picture, changes)
             except Exception:
-                self.failures += 1
-                log.exception("a listener failed")
+                self._failed("a listener failed")
+
+    def _failed(self, what: str) -> None:
+        self.failures += 1
+        log.exception(what)

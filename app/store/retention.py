@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 from sqlalchemy import Engine, delete, select
 
@@ -13,19 +14,23 @@ TRACKS_AT_ONCE = 200
 
 
 class Retention:
-    """newest: the newest time that was recorded; age is counted from there, so that old recordings can be replayed."""
+    """newest: the newest time that was recorded; age is counted from there, so that old recordings can be replayed.
 
-    def __init__(self, days: float, airport: str) -> None:
+    now: UTC s of the host. What is recorded with a time beyond it makes nothing older.
+    """
+
+    def __init__(self, days: float, airport: str, now: Callable[[], float] = time.time) -> None:
         self.keep_s = days * 86400.0
         self.airport = airport
         self.newest = 0.0
         self.deleted = 0
+        self._now = now
         self._next = time.monotonic()
 
     @property
     def limit(self) -> float:
         """What is older than this goes."""
-        return self.newest - self.keep_s
+        return min(self.newest, self._now()) - self.keep_s
 
     def run(self, engine: Engine, *, force: bool = False) -> bool:
         """Delete, if it is time; whether it was. Some hundred tracks a transaction, and the rest by time."""

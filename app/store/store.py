@@ -137,7 +137,7 @@ class Store:
         changed = []
         for sensor in picture.sensors:
             status, detail, at = self._sensors.get(sensor.id, ("", "", -1e18))
-            if (sensor.status, sensor.detail) != (status, detail) or picture.time - at >= SENSOR_EVERY_S:
+            if (sensor.status, sensor.detail) != (status, detail) or not 0 <= picture.time - at < SENSOR_EVERY_S:
                 self._sensors[sensor.id] = (sensor.status, sensor.detail, picture.time)
                 changed.append((picture.time, sensor))
         return tuple(changed)

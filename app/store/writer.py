@@ -165,7 +165,7 @@ class Writer:
         changed = update(schema.tracks).where(schema.tracks.c.uid == bindparam("which"))
         values = [{"which": uid, **{name: row[name] for name in names}} for uid, row in newest.items()]
         connection.execute(changed.values({name: bindparam(name) for name in names}), values)
-        self._forget(float(tracks.time.max()))
+        self._forget(min(float(tracks.time.max()), time.time()))
         return Counter(points=len(rows), tracks=made)
 
     def _track_row(self, tracks: Tracks, i: int) -> Row:

@@ -281,7 +281,7 @@ class AlertMonitor:
                 if quiet <= life.raise_looks * max(life.look_s, 1.0):
                     kept.append(case)
             elif quiet >= (life.lost_s if lost else life.clear_s) and quiet > 0:
-                changes.append(self._clear(case, s.time, "target lost" if lost else "conflict ended"))
+                changes.append(self._clear(case, s.time, _why_cleared(lost, s.degraded)))
             else:
                 kept.append(case)
                 changes += self._renew(case, s, rows)
@@ -354,3 +354,10 @@ class AlertMonitor:
         alert = replace(case.alert, state="cleared", cleared_at=time, updated_at=time, clear_reason=reason, aural=False)
         self._state.cleared.append(alert)
         return AlertChange("clear", time, alert)
+
+
+def _why_cleared(lost: bool, degraded: bool) -> str:
+    """A target that vanished while a radar is not well was lost with its sensor: no proof that the danger is over."""
+    if not lost:
+        return "conflict ended"
+    return "sensor lost" if degraded else "target lost"

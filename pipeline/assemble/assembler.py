@@ -65,6 +65,7 @@ class Assembler:
         self._decoding: dict[str, int] = {"malformed": 0, "wrong_category": 0, "compressed": 0, "summary": 0}
         self._block = np.array([-1, -1, 0, 0, 0, 0], np.int64)
         self._rows = int(np.diff(edges).max())
+        self._arrived = math.nan
         self._new_buffers()
 
     def push_datagrams(
@@ -97,14 +98,15 @@ class Assembler:
                 self._counts,
             )  # fmt: skip
             if full != FILLED:
+                self._arrived = float(arrival[-1]) if n else self._arrived
                 return blocks
-            block = self._close(next_row=row if at < n else -1)
+            block = self._close(row if at < n else -1, float(arrival[at - 1]) if at else self._arrived)
             if block is not None:
                 blocks.append(block)
 
     def flush(self) -> list[Sweeps]:
         """What is in the open block (zero or one block); for the end of a recording."""
-        block = self._close(next_row=-1) if self._block[0] >= 0 else None
+        block = self._close(-1, self._arrived) if self._block[0] >= 0 else None
         return [] if block is None else [block]
 
     @property
@@ -120,7 +122,7 @@ class Assembler:
         self._time = np.zeros(rows)
         self._azimuth = np.zeros(rows)
 
-    def _close(self, next_row: int) -> Sweeps | None:
+    def _close(self, next_row: int, arrival: float) -> Sweeps | None:
         start, end, gap = int(self._block[0]), int(self._block[1]), bool(self._block[3])
         azimuths, ranges = self._rules.azimuths, self._rules.ranges
         rows = end - start
@@ -141,6 +143,7 @@ class Assembler:
                 time=self._time[whole],
                 amplitude=amplitude,
                 last=last,
+                arrival=arrival,
             )
         self._block[:] = (-1, -1, max(end, int(self._block[2])), 0, 0, 0)
         self._new_buffers()

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from pipeline.assemble.order import LATE, MERGED, REORDERED, TAKEN, order
+from pipeline.kernels.compiled import allocating
 
 DONE, FILLED = 0, 1
 """`fill` has used all messages; the open block is to be closed before it can go on."""
@@ -15,7 +15,7 @@ START, END, CLOSED, BLOCK_GAP, BLOCK_MERGED, WHOLE = range(6)
 merged; complete rows."""
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def order_and_fill(  # type: ignore[no-untyped-def]
     fields, octets, arrival, rules, state, clock, seen, placed, times, at, row, edges, block, amplitude, cover, key,
     time, azimuth, counts,
@@ -30,7 +30,7 @@ def order_and_fill(  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def fill(  # type: ignore[no-untyped-def]
     fields, octets, placed, times, at, row, azimuths, first_cell, edges, block, amplitude, cover, key, time, azimuth,
     counts,
@@ -79,7 +79,7 @@ def fill(  # type: ignore[no-untyped-def]
     return at, -1, DONE
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _open(row, azimuths, edges, block):  # type: ignore[no-untyped-def]
     turn = row // azimuths * azimuths
     index = np.searchsorted(edges, row - turn, side="right") - 1
@@ -90,7 +90,7 @@ def _open(row, azimuths, edges, block):  # type: ignore[no-untyped-def]
     block[WHOLE] = 0
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _place(  # type: ignore[no-untyped-def]
     one, octets, moment, row, azimuths, first_cell, block, amplitude, cover, key, time, azimuth, counts
 ):

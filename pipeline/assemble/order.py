@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from pipeline.kernels.compiled import allocating
 
 COUNTERS = (
     "taken",  # messages that found their row
@@ -19,8 +20,8 @@ COUNTERS = (
     "wrong_azimuth",  # a sweep wider than a quarter turn
     "wrong_cell_count",  # cells beyond the grid, or rows left short without a loss
     "wrong_geometry",  # cell duration does not fit the grid
-    "time_backwards",  # time of day before the one before
-    "time_jump",  # time of day ahead of what the arrival allows
+    "time_backwards",  # time of day before the one before: the time was counted on by the rotation
+    "time_jump",  # time of day ahead of what the arrival allows: counted on, too
     "clock_step",  # the radar's clock was accepted at a new time
     "no_time",  # no time of day: the arrival was taken
     "wrong_source",  # another SAC or SIC
@@ -45,7 +46,7 @@ PLACED_FIELDS = 4
 
 (
     HAVE, LAST_ID, NEWEST, PREVIOUS_START, PREVIOUS_END, EXTENSION, CANDIDATE, DUPLICATE_RUN, LATE_RUN, LATE_ID,
-    TIME_RUN, AZIMUTH_RUN, NEW_SCAN, GAP,
+    TIME_RUN, AZIMUTH_RUN, STEPPED, GAP,
 ) = range(14)  # fmt: skip
 LAST_TIME, LAST_ARRIVAL = 0, 1
 
@@ -92,7 +93,7 @@ def new_state() -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     return state, np.zeros(2)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def order(fields, arrival, rules, state, clock, seen, counts, placed, times):  # type: ignore[no-untyped-def]
     """Fill `placed` (n, 4) and `times` (n, 2: UTC s, azimuth rad or nan for the grid's own) for messages `fields`.
 
@@ -110,12 +111,15 @@ def order(fields, arrival, rules, state, clock, seen, counts, placed, times):  #
         late = verdict == 1
         if not _fits(one, rules, counts):
             continue
-        time = _time(one[6], arrival[i], late, state, clock, counts)
+        time = _time(one[6], one[1], arrival[i], late, rules, state, clock, counts)
         if np.isnan(time):
             state[GAP] = 1
             continue
         first, rows, azimuth = _rows(one, rules, state, late)
-        absolute = _turn(first % rules.azimuths, time, late, rules, state, clock, counts)
+        elapsed = (arrival[i] if state[STEPPED] == 1 else time) - clock[
+            LAST_ARRIVAL if state[STEPPED] == 1 else LAST_TIME
+        ]
+        absolute = _turn(first % rules.azimuths, elapsed, late, rules, state, counts)
         if absolute < 0:
             state[GAP] = 1
             continue
@@ -133,7 +137,7 @@ def order(fields, arrival, rules, state, clock, seen, counts, placed, times):  #
             clock[LAST_ARRIVAL] = arrival[i]
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _sequence(one, state, seen, counts):  # type: ignore[no-untyped-def]
     """0 in order, 1 late, -1 not to be taken."""
     message = one[0]
@@ -179,7 +183,7 @@ def _sequence(one, state, seen, counts):  # type: ignore[no-untyped-def]
     return 1 if late else 0
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _restart(message, state, seen, counts):  # type: ignore[no-untyped-def]
     counts[RESTART] += 1
     seen[:] = -1
@@ -190,7 +194,7 @@ def _restart(message, state, seen, counts):  # type: ignore[no-untyped-def]
     state[GAP] = 1
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _fits(one, rules, counts):  # type: ignore[no-untyped-def]
     """Cells, cell duration and azimuths are such as the grid can take."""
     reach = one[3] + one[5]
@@ -207,37 +211,41 @@ def _fits(one, rules, counts):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(nogil=True, cache=True)
-def _time(count, arrival, late, state, clock, counts):  # type: ignore[no-untyped-def]
+@allocating
+def _time(count, start, arrival, late, rules, state, clock, counts):  # type: ignore[no-untyped-def]
     """UTC of the message; nan when it is not to be taken."""
     if count < 0:
         counts[NO_TIME] += 1
     if state[HAVE] == 0:
         return _of_day(count, arrival, arrival)
     last = clock[LAST_TIME]
+    elapsed = max(0.0, arrival - clock[LAST_ARRIVAL])
     # the day goes on from the message before, so that a recording may be replayed faster than time
-    time = _of_day(count, arrival, last + max(0.0, arrival - clock[LAST_ARRIVAL]))
+    time = _of_day(count, arrival, last + elapsed)
     if late:
         if abs(time - last) > JUMP:
             counts[LATE] += 1
             return np.nan
         return min(time, last)
     back = time < last - TIME_TOLERANCE
-    ahead = time > last + max(0.0, arrival - clock[LAST_ARRIVAL]) + JUMP
+    ahead = time > last + elapsed + JUMP
     if not (back or ahead):
         state[TIME_RUN] = 0
         return max(time, last)
     state[TIME_RUN] += 1
     if state[TIME_RUN] < BELIEVED:
         counts[TIME_BACKWARDS if back else TIME_JUMP] += 1
-        return np.nan
+        # the echoes are good though their time is not
+        forward = (start - state[PREVIOUS_START]) & 0xFFFF
+        turned = forward / 65536 * rules.period if state[PREVIOUS_START] >= 0 and forward < 0x8000 else 0.0
+        return last + min(elapsed, turned)
     counts[CLOCK_STEP] += 1
     state[TIME_RUN] = 0
-    state[NEW_SCAN] = 1
+    state[STEPPED] = 1
     return _of_day(count, arrival, arrival)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _of_day(count, arrival, near):  # type: ignore[no-untyped-def]
     """UTC of a time of day: on the day that brings it next to `near`; the arrival when there is none."""
     if count < 0:
@@ -250,7 +258,7 @@ def _of_day(count, arrival, near):  # type: ignore[no-untyped-def]
     return time
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _rows(one, rules, state, late):  # type: ignore[no-untyped-def]
     """(first grid row, rows, azimuth of the centre or nan) that the message covers."""
     start, width = one[1], (one[2] - one[1]) & 0xFFFF
@@ -277,9 +285,12 @@ def _rows(one, rules, state, late):  # type: ignore[no-untyped-def]
     return first, 1, middle * (2 * np.pi / FINE)
 
 
-@njit(nogil=True, cache=True)
-def _turn(row, time, late, rules, state, clock, counts):  # type: ignore[no-untyped-def]
-    """Absolute row (turn * azimuths + row) of a row of the grid; -1 when it is not to be taken."""
+@allocating
+def _turn(row, elapsed, late, rules, state, counts):  # type: ignore[no-untyped-def]
+    """Absolute row (turn * azimuths + row) of a row of the grid; -1 when it is not to be taken.
+
+    elapsed: seconds since the newest message.
+    """
     azimuths = rules.azimuths
     if state[HAVE] == 0:
         return row
@@ -292,11 +303,8 @@ def _turn(row, time, late, rules, state, clock, counts):  # type: ignore[no-unty
             return -1
         return newest + step
     next_turn = (newest // azimuths + 1) * azimuths + row
-    if state[NEW_SCAN] == 1:
-        state[NEW_SCAN] = 0
-        state[AZIMUTH_RUN] = 0
-        return next_turn
-    elapsed = time - clock[LAST_TIME]
+    stepped = state[STEPPED] == 1
+    state[STEPPED] = 0
     if elapsed > 0.4 * rules.period:
         # after an outage the time says whether north was passed; however many turns were missed, one is counted
         turns = np.rint(elapsed / rules.period - forward / azimuths)
@@ -309,7 +317,7 @@ def _turn(row, time, late, rules, state, clock, counts):  # type: ignore[no-unty
         state[AZIMUTH_RUN] = 0
         return newest + step
     state[AZIMUTH_RUN] += 1
-    if state[AZIMUTH_RUN] < BELIEVED:
+    if state[AZIMUTH_RUN] < BELIEVED and not stepped:  # with a new time the radar, or a recording, has begun anew
         counts[AZIMUTH_BACKWARDS] += 1
         return -1
     state[AZIMUTH_RUN] = 0

@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.contracts.associate import Assignment, Expected, Measured
 from pipeline.kernels.assignment import assign_sparse
+from pipeline.kernels.compiled import allocating
 from pipeline.tables.arrays import Array, Floats
 
 
@@ -95,7 +95,7 @@ def _grid(position: Floats, cell: float) -> tuple[Array, Array, Floats]:
     return start, order, np.array([west, south, cell, nx, ny], dtype=np.float64)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _sort_cells(position: Floats, west: float, south: float, cell: float, nx: int, start: Array, order: Array) -> None:
     m = len(position)
     where = np.empty(m, np.int32)
@@ -110,7 +110,7 @@ def _sort_cells(position: Floats, west: float, south: float, cell: float, nx: in
         filled[where[j]] += 1
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _gate(
     time: Floats, state: Floats, cov: Floats, window: Floats, extent: Floats, m_time: Floats, m_position: Floats,
     m_noise: Floats, gate: float, max_gate: float, extent_sd: float, start: Array, order: Array, grid: Floats,
@@ -153,7 +153,7 @@ def _gate(
     return k
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _span(low: float, high: float, cell: float, cells: int) -> tuple[int, int]:
     """Cells [from, to) that an interval touches."""
     if high < 0.0 or low > cells * cell:
@@ -161,7 +161,7 @@ def _span(low: float, high: float, cell: float, cells: int) -> tuple[int, int]:
     return max(int(low / cell), 0) if low > 0.0 else 0, min(int(high / cell) + 1, cells)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _taken(first: Array, pair: Array, squared: Floats, chosen: NDArray[np.int32], distance: Floats) -> None:
     for i in range(len(chosen)):
         for k in range(first[i], first[i + 1]):

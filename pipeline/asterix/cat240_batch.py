@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from pipeline.asterix.cat240_decode import DecodeError, SummaryMessage, VideoMessage, decode
+from pipeline.asterix.cat240_decode import LONGEST_DAY, DecodeError, SummaryMessage, VideoMessage, decode
+from pipeline.kernels.compiled import allocating
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +98,7 @@ def _slowly(
     return VideoBatch.of(messages), np.array(origin, np.int64)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _scan(datagrams, lengths, fields, good):  # type: ignore[no-untyped-def]
     count = 0
     for i in range(lengths.shape[0]):
@@ -107,7 +107,7 @@ def _scan(datagrams, lengths, fields, good):  # type: ignore[no-untyped-def]
     return count
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _read(data, length, row, out):  # type: ignore[no-untyped-def]
     """One datagram; False when it is not the common case, or wrong."""
     if length < 32 or length > data.shape[0] or data[0] != 240 or (data[1] << 8 | data[2]) != length:
@@ -133,7 +133,7 @@ def _read(data, length, row, out):  # type: ignore[no-untyped-def]
     if timed:
         at = 32 + room
         time = np.int64(data[at]) << 16 | np.int64(data[at + 1]) << 8 | data[at + 2]
-    if duration == 0 or time >= 86400 * 128:
+    if duration == 0 or time >= LONGEST_DAY:
         return False
     out[0] = _get4(data, 8)
     out[1] = np.int64(data[12]) << 8 | data[13]
@@ -148,7 +148,7 @@ def _read(data, length, row, out):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _get4(data, at):  # type: ignore[no-untyped-def]
     high = np.int64(data[at]) << 24 | np.int64(data[at + 1]) << 16
     return high | np.int64(data[at + 2]) << 8 | np.int64(data[at + 3])

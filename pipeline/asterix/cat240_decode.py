@@ -18,6 +18,9 @@ CATEGORY = 240
 MAX_CELLS = 65536
 """More cells than this in one message are not believed: 254 blocks of 256 octets hold fewer 8-bit cells."""
 
+LONGEST_DAY = 86401 * 128
+"""Counts of 1/128 s in a day with a leap second: a clock that shows it says 23:59:60, time of day 86,400."""
+
 Reason = Literal["malformed", "wrong_category", "compressed"]
 
 
@@ -155,8 +158,8 @@ def _time(items: dict[int, bytes]) -> int | None:
     if 12 not in items:
         return None
     counts = int.from_bytes(items[12], "big")
-    if counts >= 86400 * 128:
-        raise DecodeError("malformed", f"time of day {counts / 128:.1f} s is more than a day")
+    if counts >= LONGEST_DAY:
+        raise DecodeError("malformed", f"time of day {counts / 128:.1f} s is more than a day with a leap second")
     return counts
 
 

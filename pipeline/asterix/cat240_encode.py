@@ -9,8 +9,9 @@ from __future__ import annotations
 import struct
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from pipeline.kernels.compiled import allocating
 
 MAX_DATAGRAM = 1472
 """The UDP payload that fits one Ethernet frame of 1,500 octets."""
@@ -89,10 +90,12 @@ def azimuth_counts(azimuth: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _time_counts(time_of_day: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Seconds since midnight to 1/128 s, -1 for nan."""
+    """Seconds since midnight to 1/128 s, -1 for nan; 86,400 and more is a leap second."""
     seconds = np.asarray(time_of_day, np.float64)
     known = np.isfinite(seconds)
-    counts = np.rint(np.where(known, seconds, 0.0) * TIME_STEPS).astype(np.int64) % (86400 * TIME_STEPS)
+    counts = np.rint(np.where(known, seconds, 0.0) * TIME_STEPS).astype(np.int64)
+    # what is rounded up to midnight belongs to the next day
+    counts = np.where(seconds >= 86400, counts, counts % (86400 * TIME_STEPS))
     return np.where(known, counts, -1)
 
 
@@ -147,7 +150,7 @@ def encode_summary(text: str, *, sac: int = 0, sic: int = 0) -> bytes:
     return b"\xf0" + struct.pack(">H", 3 + len(record)) + record
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _encode(amplitude, start, end, time, first_message, sac, sic, femto, start_cell, chunk, datagrams, lengths):  # type: ignore[no-untyped-def]
     ranges = amplitude.shape[1]
     parts = (ranges + chunk - 1) // chunk
@@ -194,7 +197,7 @@ def _encode(amplitude, start, end, time, first_message, sac, sic, femto, start_c
             lengths[m] = size
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _put4(out, at, value):  # type: ignore[no-untyped-def]
     out[at] = (value >> 24) & 255
     out[at + 1] = (value >> 16) & 255

@@ -16,11 +16,11 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.bearing.sense import pointed
 from pipeline.contracts.bearing import NO_BEARING, Bearing, Expected, TargetView
+from pipeline.kernels.compiled import allocating, reassociating
 from pipeline.kernels.correlate import belief, decibels, fit
 from pipeline.kernels.echo import measured
 from pipeline.kernels.planform import Planform, Templates, templates
@@ -166,7 +166,7 @@ def _bank(part: MaximumLikelihood, video: VideoFormat) -> tuple[Floats, Floats, 
     return np.array(widths), steps, read_only(fine), read_only(coarse, np.float32)
 
 
-@njit(nogil=True, cache=True, fastmath=True)
+@reassociating
 def _halved(picture: Any, out: Any) -> float:
     """The picture with pixels twice as wide; the sum of their squares is returned."""
     total = 0.0
@@ -181,7 +181,7 @@ def _halved(picture: Any, out: Any) -> float:
     return total
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _search(amplitude: Any, grid: Any, place: Any, rule: Any, steps: Any, coarse: Any, fine: Any, modes: Any) -> None:
     """The best headings, finely. modes: (n, 3) heading (rad from north), log likelihood, variance (rad^2)."""
     east, north, azimuth, background = place
@@ -229,7 +229,7 @@ def _search(amplitude: Any, grid: Any, place: Any, rule: Any, steps: Any, coarse
         )  # fmt: skip
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _refine(
     picture: Any, bank: Any, middle: int, down: int, right: int, scene: Any, prior: Any, likely: Any, mode: Any
 ) -> None:

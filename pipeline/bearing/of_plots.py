@@ -52,6 +52,10 @@ class Expectations:
         good = np.isfinite(np.stack(table)).all(axis=0) & (table[3] > 0)
         return cls(*(one[good] for one in table))
 
+    def table(self) -> Floats:
+        """(4, n) the columns in order."""
+        return np.stack([self.east, self.north, self.heading, self.sd])
+
     def at(self, east: float, north: float, length: float) -> Expected | None:
         """The nearest expectation, if it is near enough for a plot of this length."""
         if not len(self.east):
@@ -77,6 +81,15 @@ class PlotBearings:
         self._state = part.start(site)
         self._sector = -1
         self._used = 0
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """(sector of the turn, plots looked at in it) so far."""
+        return self._sector, self._used
+
+    @place.setter
+    def place(self, place: tuple[int, int]) -> None:
+        self._sector, self._used = place
 
     def __call__(self, plots: Plots, newest: NDArray[np.uint8]) -> Plots:
         """The plots with bearings where the part finds any; those of the cells stay elsewhere.

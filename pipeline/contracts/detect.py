@@ -10,7 +10,7 @@ A detector is a frozen dataclass of settings, named by its file and given as `PA
 * `thresholds(sweeps, state)` gives the limits that the call would compare the block with, and changes nothing: for
   measuring false alarm rates without waiting for false alarms, and for displays; not for the hot path.
 
-Rules, tested by `tests.pipeline.contracts.front_end.DetectorContract`:
+Rules, tested by `tests.pipeline.contracts.detect.DetectorContract`:
 
 * Blocks come in order of scan and row; whole scans, sectors and single rows may be missing. The bits of a sweep do not
   depend on how the sweeps were cut into blocks, one sweep to a whole scan, only on the sweeps before it.

@@ -9,7 +9,7 @@ An extractor is a frozen dataclass of settings, named by its file and given as `
   delivered;
 * `flush(state)` completes what is still open, as at the end of a recording.
 
-Rules, tested by `tests.pipeline.contracts.front_end.ExtractorContract`:
+Rules, tested by `tests.pipeline.contracts.extract.ExtractorContract`:
 
 * The plots do not depend on how the sweeps were cut into blocks nor on any order of scanning inside a turn.
 * The turn has no seam: a target that lies across north is one plot, at the time at which its own sweeps were made.

@@ -12,17 +12,15 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from pipeline.detect.calibration import false_alarm_probability, mean_offsets_db, power_mean_offsets_db
-from pipeline.detect.checks import check_block, check_pfa, check_start, check_whole
+from pipeline.detect.calibration import mean_offsets_db, power_mean_offsets_db
 from pipeline.detect.limits import limits_used
-from pipeline.detect.window import BEYOND, Window, WindowState, window_fields
+from pipeline.detect.window import BEYOND, WindowState, check_settings, detect_block, window_fields, window_of
 from pipeline.kernels.bits import borrowed
+from pipeline.kernels.compiled import allocating
 from pipeline.kernels.recent_rows import take_row
-from pipeline.kernels.run_cap import CapSettings, detect_row
-from pipeline.state import read_only
+from pipeline.kernels.run_cap import detect_row
 from pipeline.tables import Detections, Sweeps, VideoFormat
 
 Domain = Literal["log", "power"]
@@ -63,42 +61,26 @@ class CellAveraging:
     max_runs: int = 40_000
 
     def __post_init__(self) -> None:
-        check_pfa(self.pfa)
+        check_settings(self)
         if self.domain not in get_args(Domain):
             raise ValueError(f"domain must be one of {', '.join(get_args(Domain))}")
-        check_whole(max_runs=self.max_runs)
-        _ = self.window
-
-    @property
-    def window(self) -> Window:
-        """The cells that are averaged."""
-        return Window(self.side, self.guard, self.sweeps, self.guard_sweeps)
 
     def start(
         self, video: VideoFormat, surface: NDArray[np.uint8] | None = None, growth_db: float | None = None
     ) -> CellAveragingState:
         """The state before the first sweep. surface is not used."""
-        check_start(video, surface, growth_db)
         step = video.db_per_step
-        independent = np.floor(self.window.independent(video) + 1e-9).astype(int)
-        offsets = power_mean_offsets_db if self.domain == "power" else mean_offsets_db
+        independent = np.floor(window_of(self).independent(video) + 1e-9).astype(int)
+        power = self.domain == "power"
+        offsets = power_mean_offsets_db if power else mean_offsets_db
 
         def above(pfa: float) -> NDArray[np.float64]:
             steps = offsets(pfa, step, max(int(independent.max()), 1))[independent] / step
             return np.asarray(np.minimum(steps, BEYOND))
 
-        power = self.domain == "power"
         amplitude = np.arange(256)
         return CellAveragingState(
-            **window_fields(
-                self.window,
-                video,
-                self.max_runs,
-                growth_db,
-                above,
-                self.pfa,
-                false_alarm_probability(growth_db or 0.0, step),
-            ),
+            **window_fields(self, video, surface, growth_db, above),
             values=np.rint(FULL_POWER * 10 ** ((amplitude - 255) * step / 10)).astype(int) if power else amplitude,
             sums=np.zeros((3, video.ranges + 2 * (self.side + self.guard) + 1), np.int64),
             scale=10 / step if power else 0.0,
@@ -106,22 +88,7 @@ class CellAveraging:
 
     def __call__(self, sweeps: Sweeps, state: CellAveragingState) -> Detections:
         """The detections of the block. Raises TableError when it is not on the grid of the state."""
-        check_block(sweeps, state.azimuths, state.stack.shape[1])
-        mask = np.empty((len(sweeps), state.threshold.size // 64), np.uint64)
-        growth = np.empty((len(sweeps), state.growth.size // 64), np.uint64)
-        before = int(state.degraded_sweeps[0])
-        cap = CapSettings.of(self.max_runs, state.azimuths)
-        _detect(
-            read_only(sweeps.amplitude),
-            read_only(sweeps.row, np.int64) + sweeps.scan * state.azimuths,
-            (mask, growth),
-            (self.guard, self.side + self.guard, self.window.near, state.scale),
-            (state.count, state.above, state.growth_above, state.values),
-            (state.ring, state.ring_row, state.stack, state.sums, state.threshold, state.growth),
-            (cap.refill, cap.depth, state.budget, state.degraded_sweeps, state.tail),
-        )
-        degraded = int(state.degraded_sweeps[0]) > before
-        return Detections(mask, degraded, growth if state.growth.size else None)
+        return detect_block(_detect, self, sweeps, state, (state.scale, state.values, state.sums))
 
     def thresholds(self, sweeps: Sweeps, state: CellAveragingState) -> NDArray[np.uint8]:
         """(n, ranges) the limits that the call would compare the block with."""
@@ -131,19 +98,16 @@ class CellAveraging:
 PART = CellAveraging
 
 
-@njit(nogil=True, cache=True)
-def _detect(amplitude: Any, rows: Any, masks: Any, window: Any, tables: Any, memory: Any, cap: Any) -> None:
+@allocating
+def _detect(amplitude: Any, rows: Any, masks: Any, window: Any, tables: Any, memory: Any, cap: Any, own: Any) -> None:
+    """See `detect_block`. own: scale, values, sums of the state."""
     amplitude, rows = borrowed(amplitude), borrowed(rows)
     mask, grown = borrowed(masks[0]), borrowed(masks[1])
-    guard, reach, near, scale = window
-    count, above, growth_above, values = (
-        borrowed(tables[0]),
-        borrowed(tables[1]),
-        borrowed(tables[2]),
-        borrowed(tables[3]),
-    )
+    guard, reach, near = window
+    count, above, growth_above = borrowed(tables[0]), borrowed(tables[1]), borrowed(tables[2])
     ring, ring_row, stack = borrowed(memory[0]), borrowed(memory[1]), borrowed(memory[2])
-    sums, threshold, growth = borrowed(memory[3]), borrowed(memory[4]), borrowed(memory[5])
+    threshold, growth = borrowed(memory[3]), borrowed(memory[4])
+    scale, values, sums = own[0], borrowed(own[1]), borrowed(own[2])
     refill, depth, budget, degraded, tail = cap
     budget, degraded, tail = borrowed(budget), borrowed(degraded), borrowed(tail)
     ranges = amplitude.shape[1]
@@ -165,7 +129,7 @@ def _detect(amplitude: Any, rows: Any, masks: Any, window: Any, tables: Any, mem
         detect_row(cells, threshold, growth, mask[i], grown[i], (refill, depth), budget, degraded, tail)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _add_up(stack: Any, end: int, values: Any, scale: float, margin: int, sums: Any) -> None:
     ranges = stack.shape[1]
     column = sums[margin + 1 : margin + 1 + ranges]
@@ -185,7 +149,7 @@ def _add_up(stack: Any, end: int, values: Any, scale: float, margin: int, sums: 
     sums[margin + 1 + ranges :] = total
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _limits(level: Any, number: Any, above: Any, scale: float, limits: Any, ranges: int) -> None:
     for j in range(ranges):
         mean = level[j] / max(number[j], 1)

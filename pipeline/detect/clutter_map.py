@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.detect.calibration import (
@@ -24,6 +23,7 @@ from pipeline.detect.calibration import (
 from pipeline.detect.checks import check_block, check_pfa, check_positive, check_start, check_whole
 from pipeline.detect.limits import limits_used
 from pipeline.kernels.bits import borrowed
+from pipeline.kernels.compiled import allocating
 from pipeline.kernels.run_cap import CapSettings, detect_row
 from pipeline.state import ArrayState, StateError, read_only, remembered
 from pipeline.tables import Detections, Sweeps, VideoFormat
@@ -168,7 +168,7 @@ class ClutterMap:
 PART = ClutterMap
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _detect(amplitude: Any, rows: Any, masks: Any, tables: Any, rule: Any, memory: Any, cap: Any) -> None:
     amplitude, rows = borrowed(amplitude), borrowed(rows)
     mask, grown = borrowed(masks[0]), borrowed(masks[1])

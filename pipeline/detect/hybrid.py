@@ -13,7 +13,6 @@ from math import inf
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.detect.calibration import estimation_loss_db, threshold_offset_db
@@ -29,6 +28,7 @@ from pipeline.kernels.bits import (
     compare_twice_and_add_four,
     count_runs,
 )
+from pipeline.kernels.compiled import allocating
 from pipeline.kernels.run_cap import CapSettings, fit_row
 from pipeline.state import ArrayState, StateError, read_only, remembered
 from pipeline.tables import Detections, Sweeps, VideoFormat
@@ -195,7 +195,7 @@ class Hybrid:
 PART = Hybrid
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _detect(
     amplitude: Any,
     rows: Any,
@@ -298,7 +298,7 @@ def _detect(
     budget[0] = left
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _next_stripe(stripe: int, scan: int, layout: Any, rule: Any, memory: Any, swept: Any) -> None:
     # One function with plain loops over eight bytes at a time: a call that hands on arrays, or a loop whose length the
     # compiler does not know, costs more here than the work itself.

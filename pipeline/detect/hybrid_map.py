@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.detect.macro_cells import MapCells
 from pipeline.kernels.bits import borrowed
+from pipeline.kernels.compiled import allocating
 from pipeline.kernels.run_cap import detect_row
 from pipeline.state import ArrayState, StateError, remembered
 
@@ -82,7 +82,7 @@ def refuse_untrue_levels(saved: Mapping[str, NDArray[Any]]) -> None:
         raise StateError("levels or weights that cannot be true")
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def detect_in_map_cells(
     amplitude: Any,
     rows: Any,
@@ -126,7 +126,7 @@ def detect_in_map_cells(
         detect_row(cells, threshold, lower, bits, grown[i] if grows else bits, cap, budget, degraded, tail)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _finish_scan(rule: Any, full: Any, memory: Any) -> None:
     mu, loss, most, learn, grow, _ = rule
     level, weight, limit, growth_limit, sums, heard = memory

@@ -12,17 +12,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from pipeline.detect.calibration import false_alarm_probability, order_offset_steps
-from pipeline.detect.checks import check_block, check_pfa, check_start, check_whole
+from pipeline.detect.calibration import order_offset_steps
 from pipeline.detect.limits import limits_used
-from pipeline.detect.window import BEYOND, Window, WindowState, window_fields
+from pipeline.detect.window import BEYOND, WindowState, check_settings, detect_block, window_fields, window_of
 from pipeline.kernels.bits import borrowed
+from pipeline.kernels.compiled import allocating
 from pipeline.kernels.recent_rows import take_row
-from pipeline.kernels.run_cap import CapSettings, detect_row
-from pipeline.state import read_only
+from pipeline.kernels.run_cap import detect_row
 from pipeline.tables import Detections, Sweeps, VideoFormat
 
 GOLDEN = (np.sqrt(5) - 1) / 2
@@ -58,24 +56,16 @@ class OrderedStatistic:
     max_runs: int = 40_000
 
     def __post_init__(self) -> None:
-        check_pfa(self.pfa)
+        check_settings(self)
         if not 0 < self.rank <= 1:
             raise ValueError("rank must lie above 0 and not above 1")
-        check_whole(max_runs=self.max_runs)
-        _ = self.window
-
-    @property
-    def window(self) -> Window:
-        """The cells that are ordered."""
-        return Window(self.side, self.guard, self.sweeps, self.guard_sweeps)
 
     def start(
         self, video: VideoFormat, surface: NDArray[np.uint8] | None = None, growth_db: float | None = None
     ) -> OrderedStatisticState:
         """The state before the first sweep. surface is not used."""
-        check_start(video, surface, growth_db)
-        count = self.window.counts(video.ranges)
-        independent = self.window.independent(video)
+        count = window_of(self).counts(video.ranges)
+        independent = window_of(self).independent(video)
         rank = np.clip(np.rint(self.rank * count), 1, np.maximum(count, 1)).astype(np.int64)
         spread = np.arange(video.ranges) * GOLDEN % 1
 
@@ -86,37 +76,11 @@ class OrderedStatistic:
             ]
             return np.asarray(np.floor(np.array(steps)[which].reshape(count.shape) + spread))
 
-        return OrderedStatisticState(
-            **window_fields(
-                self.window,
-                video,
-                self.max_runs,
-                growth_db,
-                above,
-                self.pfa,
-                false_alarm_probability(growth_db or 0.0, video.db_per_step),
-            ),
-            rank=rank,
-        )
+        return OrderedStatisticState(**window_fields(self, video, surface, growth_db, above), rank=rank)
 
     def __call__(self, sweeps: Sweeps, state: OrderedStatisticState) -> Detections:
         """The detections of the block. Raises TableError when it is not on the grid of the state."""
-        check_block(sweeps, state.azimuths, state.stack.shape[1])
-        mask = np.empty((len(sweeps), state.threshold.size // 64), np.uint64)
-        growth = np.empty((len(sweeps), state.growth.size // 64), np.uint64)
-        before = int(state.degraded_sweeps[0])
-        cap = CapSettings.of(self.max_runs, state.azimuths)
-        _detect(
-            read_only(sweeps.amplitude),
-            read_only(sweeps.row, np.int64) + sweeps.scan * state.azimuths,
-            (mask, growth),
-            (self.guard, self.side + self.guard, self.window.near),
-            (state.count, state.rank, state.above, state.growth_above),
-            (state.ring, state.ring_row, state.stack, state.threshold, state.growth),
-            (cap.refill, cap.depth, state.budget, state.degraded_sweeps, state.tail),
-        )
-        degraded = int(state.degraded_sweeps[0]) > before
-        return Detections(mask, degraded, growth if state.growth.size else None)
+        return detect_block(_detect, self, sweeps, state, (state.rank,))
 
     def thresholds(self, sweeps: Sweeps, state: OrderedStatisticState) -> NDArray[np.uint8]:
         """(n, ranges) the limits that the call would compare the block with."""
@@ -126,19 +90,16 @@ class OrderedStatistic:
 PART = OrderedStatistic
 
 
-@njit(nogil=True, cache=True)
-def _detect(amplitude: Any, rows: Any, masks: Any, window: Any, tables: Any, memory: Any, cap: Any) -> None:
+@allocating
+def _detect(amplitude: Any, rows: Any, masks: Any, window: Any, tables: Any, memory: Any, cap: Any, own: Any) -> None:
+    """See `detect_block`. own: rank of the state."""
     amplitude, rows = borrowed(amplitude), borrowed(rows)
     mask, grown = borrowed(masks[0]), borrowed(masks[1])
     guard, reach, near = window
-    count, rank, above, growth_above = (
-        borrowed(tables[0]),
-        borrowed(tables[1]),
-        borrowed(tables[2]),
-        borrowed(tables[3]),
-    )
+    count, above, growth_above = borrowed(tables[0]), borrowed(tables[1]), borrowed(tables[2])
     ring, ring_row, stack = borrowed(memory[0]), borrowed(memory[1]), borrowed(memory[2])
     threshold, growth = borrowed(memory[3]), borrowed(memory[4])
+    rank = borrowed(own[0])
     refill, depth, budget, degraded, tail = cap
     budget, degraded, tail = borrowed(budget), borrowed(degraded), borrowed(tail)
     ranges = amplitude.shape[1]
@@ -158,7 +119,7 @@ def _detect(amplitude: Any, rows: Any, masks: Any, window: Any, tables: Any, mem
         detect_row(cells, threshold, growth, mask[i], grown[i], (refill, depth), budget, degraded, tail)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _order(
     stack: Any, close: int, rows: int, guard: int, reach: int, count: Any, rank: Any, histogram: Any, level: Any
 ) -> None:

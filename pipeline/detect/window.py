@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.detect.checks import check_whole
+from pipeline.detect.calibration import false_alarm_probability
+from pipeline.detect.checks import check_block, check_pfa, check_start, check_whole
 from pipeline.kernels.run_cap import CapSettings
-from pipeline.state import ArrayState, remembered
-from pipeline.tables import VideoFormat
+from pipeline.state import ArrayState, read_only, remembered
+from pipeline.tables import Detections, Sweeps, VideoFormat
 
 BEYOND = 600.0
 """Steps above any level that no amplitude reaches."""
@@ -92,28 +93,91 @@ class WindowState(ArrayState):
         return {"degraded_sweeps": int(self.degraded_sweeps[0])}
 
 
+class WindowSettings(Protocol):
+    """The settings that detectors with a window have in common; `CellAveraging` says what each means."""
+
+    @property
+    def pfa(self) -> float: ...  # noqa: D102
+    @property
+    def side(self) -> int: ...  # noqa: D102
+    @property
+    def guard(self) -> int: ...  # noqa: D102
+    @property
+    def sweeps(self) -> int: ...  # noqa: D102
+    @property
+    def guard_sweeps(self) -> int: ...  # noqa: D102
+    @property
+    def max_runs(self) -> int: ...  # noqa: D102
+
+
+def window_of(part: WindowSettings) -> Window:
+    """The cells that the part judges by."""
+    return Window(part.side, part.guard, part.sweeps, part.guard_sweeps)
+
+
+def check_settings(part: WindowSettings) -> None:
+    """Raises ValueError, with its name, for a setting that is out of bounds."""
+    check_pfa(part.pfa)
+    check_whole(max_runs=part.max_runs)
+    window_of(part)
+
+
 def window_fields(
-    window: Window,
+    part: WindowSettings,
     video: VideoFormat,
-    max_runs: int,
+    surface: NDArray[np.uint8] | None,
     growth_db: float | None,
     above: Callable[[float], NDArray[np.float64]],
-    pfa: float,
-    growth_pfa: float,
 ) -> dict[str, Any]:
-    """The fields of a WindowState. above: steps from level to limit, shaped as `Window.counts`, for a probability."""
-    limits = above(pfa)
+    """The fields of a WindowState before the first sweep; surface and growth_db as given to `Detector.start`.
+
+    above: steps from level to limit, shaped as `Window.counts`, for a false alarm probability. Raises ValueError for a
+    surface of the wrong shape or a growth_db that is negative or no number.
+    """
+    check_start(video, surface, growth_db)
+    window = window_of(part)
+    limits = grow = above(part.pfa)
+    if growth_db is not None:
+        grow = np.minimum(above(false_alarm_probability(growth_db, video.db_per_step)), limits)
     return {
         "azimuths": video.azimuths,
         "count": window.counts(video.ranges),
         "above": limits,
-        "growth_above": limits if growth_db is None else np.minimum(above(growth_pfa), limits),
+        "growth_above": grow,
         "stack": np.zeros((1 + window.sweeps, video.ranges), np.uint8),
         "tail": np.zeros(64, np.uint8),
         "ring": np.zeros((window.sweeps, video.ranges), np.uint8),
         "ring_row": np.full(window.sweeps, NEVER, np.int64),
         "threshold": np.full(64 * video.words, 255, np.uint8),
         "growth": np.full(0 if growth_db is None else 64 * video.words, 255, np.uint8),
-        "budget": np.array([CapSettings.of(max_runs, video.azimuths).depth]),
+        "budget": np.array([CapSettings.of(part.max_runs, video.azimuths).depth]),
         "degraded_sweeps": np.zeros(1, np.int64),
     }
+
+
+def detect_block(
+    kernel: Any, part: WindowSettings, sweeps: Sweeps, state: WindowState, own: tuple[Any, ...]
+) -> Detections:
+    """The detections of a block by the kernel of the part. Raises TableError when it is not on the grid of the state.
+
+    The kernel is called with amplitude, absolute rows, (mask, growth mask) to fill, (guard, reach, near) of the window,
+    its tables (count, above, growth_above), its memory (ring, ring_row, stack, threshold, growth), the cap on runs as
+    in `run_cap.detect_row`, and what is its own.
+    """
+    check_block(sweeps, state.azimuths, state.stack.shape[1])
+    mask = np.empty((len(sweeps), state.threshold.size // 64), np.uint64)
+    growth = np.empty((len(sweeps), state.growth.size // 64), np.uint64)
+    before = int(state.degraded_sweeps[0])
+    cap = CapSettings.of(part.max_runs, state.azimuths)
+    kernel(
+        read_only(sweeps.amplitude),
+        read_only(sweeps.row, np.int64) + sweeps.scan * state.azimuths,
+        (mask, growth),
+        (part.guard, part.side + part.guard, window_of(part).near),
+        (state.count, state.above, state.growth_above),
+        (state.ring, state.ring_row, state.stack, state.threshold, state.growth),
+        (cap.refill, cap.depth, state.budget, state.degraded_sweeps, state.tail),
+        own,
+    )
+    degraded = int(state.degraded_sweeps[0]) > before
+    return Detections(mask, degraded, growth if state.growth.size else None)

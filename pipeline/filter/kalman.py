@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from pipeline.kernels.compiled import allocating
 
 Floats = NDArray[np.float64]
 
@@ -62,7 +63,7 @@ class Kalman:
 PART = Kalman
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _density(velocity_east: float, velocity_north: float, noise: Floats) -> tuple[float, float, float]:
     """Spectral density of the acceleration: its east-east, east-north and north-north elements."""
     still, along_sd, across_sd, turn_rate, full_speed = noise[0], noise[1], noise[2], noise[3], noise[4]
@@ -76,7 +77,7 @@ def _density(velocity_east: float, velocity_north: float, noise: Floats) -> tupl
     return a * e * e + c * n * n, (a - c) * e * n, a * n * n + c * e * e
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _move(x: Floats, p: Floats, dt: float, noise: Floats, out_x: Floats, out_p: Floats) -> None:
     """One row of predict: x (4,), p (4, 4)."""
     mee, men, mnn = _density(x[2], x[3], noise)
@@ -96,13 +97,13 @@ def _move(x: Floats, p: Floats, dt: float, noise: Floats, out_x: Floats, out_p: 
             out_p[2 + i, 2 + j] = p[2 + i, 2 + j] + q1 * m
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _predict(state: Floats, cov: Floats, dt: Floats, noise: Floats, out_state: Floats, out_cov: Floats) -> None:
     for k in range(len(state)):
         _move(state[k], cov[k], dt[k], noise, out_state[k], out_cov[k])
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _update(
     state: Floats, cov: Floats, dt: Floats, position: Floats, r: Floats, noise: Floats,
     out_state: Floats, out_cov: Floats, nis: Floats,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from pipeline.contracts.associate import Expected
+from pipeline.kernels.compiled import allocating
 from pipeline.tables.arrays import Array, Floats
 
 MARGIN_VARIANCES = 2.0
@@ -43,7 +43,7 @@ def enclosing_tracks(
     return made
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _enclosing(
     track_time: Floats, state: Floats, track_extent: Floats, track_variance: Floats, established: Array, time: Floats,
     position: Floats, variance: Floats, extent: Floats, least: float, made: Array,

@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from pipeline.kernels.compiled import allocating
 from pipeline.tables.arrays import Array, Floats
 
 AIRCRAFT_HALF_EXTENT = 21.0
@@ -100,7 +100,7 @@ def grow_extent(whole: Floats, fragment: Floats, away: Floats, direction: float)
     return Grown(grown[0], grown[1], min(shift, 1.0))
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _fragments(
     order: Array, state: Floats, cov: Floats, extent: Floats, longest_side: Floats, named: Array, aircraft: Array,
     on_apron: Array, standing: Array, rank: Floats, margin: float, whole: Array,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from pipeline.kernels.bits import borrowed, count_runs
+from pipeline.kernels.compiled import allocating, unchecked_division
 from pipeline.kernels.rainfall import ALARM, DRY, fall_of_rain, find_sources, rise_together
 from pipeline.kernels.run_cap import fit_row
 from pipeline.kernels.tiles import (
@@ -95,7 +95,7 @@ class Rule(NamedTuple):
     azimuths: Any
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def detect(
     amplitude: Any, rows: Any, scan: int, made: Any, rule: Any, layout: Any, cells: Any, patches: Any, swept: Any,
     cap: Any, tail: Any,
@@ -169,14 +169,14 @@ def detect(
                 learn_tiles(from_at, own_at + at, fine_at + at, rules_at + at, sums_at + at, strict[w], gains, most)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _fill(tail: Any, cells: Any, whole: int, rest: int) -> None:
     tail[:] = rest
     for j in range(cells.size - 64 * whole):
         tail[j] = cells[64 * whole + j]
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _limits(own_at: int, rules_at: int, limits: Any) -> None:
     """Write the limits of one row."""
     for w in range(limits.size // 64):
@@ -184,7 +184,7 @@ def _limits(own_at: int, rules_at: int, limits: Any) -> None:
         tile_limits(own_at + at, rules_at + at, limits.ctypes.data + at)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _gains(times: int, rule: Any) -> Any:
     """The gain of each of the four classes, in 1/256, one a byte: of a mean that begins with some scans of nothing; and
     in the fifth how much sooner pavement follows eight cells together, as where a shadow ends."""
@@ -196,7 +196,7 @@ def _gains(times: int, rule: Any) -> Any:
     return four | (np.uint64(sooner + 0.5) << np.uint64(32))
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _next_stripe(scan: int, stripe: int, rule: Any, layout: Any, cells: Any, patches: Any, swept: Any) -> None:
     """Hand over what the last stripe taught, and take the rules of the next."""
     tile = borrowed(layout[0])
@@ -220,13 +220,13 @@ def _next_stripe(scan: int, stripe: int, rule: Any, layout: Any, cells: Any, pat
     _take_drops(of, drop_of, drops)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _take_drops(of: Any, drop_of: Any, drops: Any) -> None:
     for k in range(drops.size):
         drops[k] = drop_of[of[k // 8]]
 
 
-@njit(nogil=True, cache=True, error_model="numpy")  # without a test for 0 the loops are vectors
+@unchecked_division
 def update_patches(rule: Any, layout: Any, cells: Any, patches: Any, cursor: Any) -> None:
     """Bring the patches up to date with the scan that is over, and make their rules for the next."""
     macro, kind_class, expected = borrowed(layout[1]), borrowed(layout[2]), borrowed(layout[3])
@@ -310,7 +310,7 @@ def update_patches(rule: Any, layout: Any, cells: Any, patches: Any, cursor: Any
         drop_of[p] = np.uint8(0 if deaf else min(max(lower, np.float32(0.0)), np.float32(127.0)))
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _begin(rule: Any, layout: Any, cells: Any, patches: Any) -> None:
     """What patches that were just swept for the first time (and again some scans later) begin with.
 
@@ -344,7 +344,7 @@ def _begin(rule: Any, layout: Any, cells: Any, patches: Any) -> None:
                     offset[row, 8 * t + j] = np.int8(min(max(begins, np.float32(-127.0)), np.float32(127.0)))
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _greatest(like: Any, heard: Any, level: Any, otherwise: Any) -> Any:
     """The greatest level of those patches that were swept."""
     greatest = np.float32(-1000.0)
@@ -354,7 +354,7 @@ def _greatest(like: Any, heard: Any, level: Any, otherwise: Any) -> Any:
     return greatest if greatest > np.float32(-1000.0) else otherwise
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _byte(value: Any) -> Any:
     """A signed number within a byte, in the low bits."""
     return np.uint64(np.int64(min(max(value, np.float32(-128.0)), np.float32(127.0)))) & np.uint64(255)

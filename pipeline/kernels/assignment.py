@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from pipeline.kernels.compiled import allocating
 
-@njit(nogil=True, cache=True)
+
+@allocating
 def assign_sparse(
     first: NDArray[Any], pair: NDArray[Any], cost: NDArray[np.float64], columns: int, chosen: NDArray[Any]
 ) -> None:

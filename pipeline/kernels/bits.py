@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import extending, njit, types
+from numba import extending, types
 from numba.core import cgutils
+
+from pipeline.kernels.compiled import allocating
 
 _BYTES = ir.VectorType(ir.IntType(8), 64)
 intrinsic: Any = extending.intrinsic
@@ -182,7 +184,7 @@ def set_bits(typing: Any, word: Any) -> Any:
     return types.uint64(types.uint64), build
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def bits_of_row(cells: Any, limits_at: int, bits: Any, tail: Any) -> Any:
     """Fill one row of words with the cells that exceed their limits, and tell whether any does.
 
@@ -253,7 +255,7 @@ def runs_in_eight(typing: Any, bits: Any, before: Any) -> Any:
     return types.uint64(types.uintp, types.uint64), build
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def count_runs(mask: Any) -> Any:
     """Number of runs of set bits in one row of words."""
     runs = types.uint64(0)  # with a signed 0 numba would count in floating point

@@ -90,7 +90,7 @@ def flush(state: ComponentState) -> Plots:
     return columns.table(int(state.radar[0]), int(count))
 
 
-@kernel()
+@kernel
 def _take_rows(
     block: Any, first_row: int, azimuths: int, rule: Any, limits: Any, pool: Any, scale: Any, out: Any
 ) -> Any:
@@ -129,7 +129,7 @@ def _take_rows(
     return count
 
 
-@inlined()
+@inlined
 def fetch_row(bits: Any, amplitude: Any, at: int) -> bool:
     """Ask for the cells under a row's bits: waiting for them costs more than all the rest. Tells whether there are
     any."""
@@ -144,13 +144,13 @@ def fetch_row(bits: Any, amplitude: Any, at: int) -> bool:
     return anything
 
 
-@inlined()
+@inlined
 def open_runs(numbers: Any) -> Any:
     """Runs in the rows of open plots: no more plots than these can become complete before the next row is taken."""
     return numbers[HEAD] - numbers[TAIL]
 
 
-@inlined()
+@inlined
 def note_row(row: int, grid_row: int, azimuth: float, time: float, constants: Any, turn: Any) -> None:
     """Remember when and where a row with runs was swept."""
     here = turn[grid_row]
@@ -163,7 +163,7 @@ def note_row(row: int, grid_row: int, azimuth: float, time: float, constants: An
     here[SCAN] = np.rint((row + here[BEFORE]) * (1.0 / constants[6]))
 
 
-@inlined()
+@inlined
 def take_row(
     row: int,
     grid_row: int,
@@ -200,7 +200,7 @@ def take_row(
             latest_run[cell] = run
 
 
-@inlined()
+@inlined
 def _link_runs(
     row: int,
     grid_row: int,
@@ -244,7 +244,7 @@ def _link_runs(
                     mine = unite(runs, mine, other, grid_row)
 
 
-@kernel()
+@kernel
 def _move_down(runs: Any, window: Any, latest: Any, numbers: Any) -> None:
     by, head = numbers[TAIL], numbers[HEAD]
     for k in range(by, head):
@@ -261,7 +261,7 @@ def _move_down(runs: Any, window: Any, latest: Any, numbers: Any) -> None:
     numbers[HEAD] = head - by
 
 
-@inlined()
+@inlined
 def retire(
     row: int, azimuths: int, reach_rows: int, limits: Any, pool: Any, geometry: Any, out: Any, count: int
 ) -> Any:
@@ -311,7 +311,7 @@ def retire(
     return count
 
 
-@kernel()
+@kernel
 def _free(root: int, runs: Any) -> None:
     run = np.int64(root)
     while True:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from pipeline.kernels.compiled import allocating, reassociating
 from pipeline.kernels.scan_convert import convert
 
 
-@njit(nogil=True, cache=True, fastmath=True)
+@reassociating
 def decibels(picture: Any, background: float, db_per_step: float, limit: float) -> float:
     """Steps to decibels over the ground, in place; the sum of their squares is returned."""
     total = 0.0
@@ -23,7 +23,7 @@ def decibels(picture: Any, background: float, db_per_step: float, limit: float) 
     return total
 
 
-@njit(nogil=True, cache=True, fastmath=True)
+@reassociating
 def fit(picture: Any, template: Any, down: int, right: int) -> Any:
     """Sum of the products with the template laid `down` and `right` pixels into the picture."""
     total = np.float32(0.0)
@@ -34,7 +34,7 @@ def fit(picture: Any, template: Any, down: int, right: int) -> Any:
     return total
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def belief(heading: float, prior: Any) -> Any:
     """Log of how likely a heading is beforehand, over that of any heading whatever."""
     expected, sd, outliers = prior
@@ -45,7 +45,7 @@ def belief(heading: float, prior: Any) -> Any:
     return np.log((1.0 - outliers) * near + outliers + 1e-12)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def explained(
     amplitude: Any, grid: Any, place: Any, scale: Any, bank: Any, headings: Any, picture: Any, out: Any
 ) -> float:

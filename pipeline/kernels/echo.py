@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from pipeline.kernels.compiled import allocating
 from pipeline.kernels.scan_convert import Grid
 from pipeline.state import read_only
 
@@ -86,7 +86,7 @@ def measured(
     return Echo(float(out[0]), int(out[1]), *(float(one) for one in out[2:]))
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _quantile(histogram: Any, wanted: float) -> Any:
     reached = 0
     for level in range(256):
@@ -97,7 +97,7 @@ def _quantile(histogram: Any, wanted: float) -> Any:
     return 255.0
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _ground(amplitude: Any, window: Any, quartile: float, most: float) -> Any:
     top, bottom, near, far = window
     histogram = np.zeros(256, np.int64)
@@ -121,7 +121,7 @@ def _ground(amplitude: Any, window: Any, quartile: float, most: float) -> Any:
     return 0.0 if seen else np.nan
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _measure(
     amplitude: Any, window: Any, grid: Any, beam: float, contrast: float, weighted: bool, step_db: float, out: Any
 ) -> bool:

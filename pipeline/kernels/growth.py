@@ -172,7 +172,7 @@ def _run(block: tuple[NDArray[Any], ...], first_row: int, state: GrowthState) ->
     return Plots.concatenate(made)
 
 
-@kernel()
+@kernel
 def _take_rows(
     block: Any,
     first_row: int,
@@ -215,7 +215,7 @@ def _take_rows(
     return count
 
 
-@inlined()
+@inlined
 def _keep_waiting(mask: Any, growth: Any, amplitude: Any, held: Any) -> None:
     """Copy the rows that are still to be looked at out of the block."""
     held_rows, marks, waiting = held[0], held[3], held[6]
@@ -228,13 +228,13 @@ def _keep_waiting(mask: Any, growth: Any, amplitude: Any, held: Any) -> None:
         waiting[slot] = -1
 
 
-@inlined()
+@inlined
 def _keep(source: Any, into: Any) -> None:
     for k in range(into.size):
         into[k] = source[k]
 
 
-@inlined()
+@inlined
 def _arrive(row: int, at: int, mask: Any, azimuth: float, time: float, box: Any, held: Any) -> None:
     """Note a row, and mark what is near its detected cells in the rows about it."""
     held_rows, held_sweep, marks, waiting = held[0], held[1], held[3], held[6]
@@ -252,7 +252,7 @@ def _arrive(row: int, at: int, mask: Any, azimuth: float, time: float, box: Any,
             _spread(row, w, seeds[w], box, held[2], held[10])
 
 
-@inlined()
+@inlined
 def _spread(row: int, w: int, seeds: Any, box: Any, near: Any, near_rows: Any) -> None:
     """Mark the detected cells of a word, and the cells next to them, in all rows that they are near."""
     one, top = np.uint64(1), np.uint64(63)
@@ -280,7 +280,7 @@ def _spread(row: int, w: int, seeds: Any, box: Any, near: Any, near_rows: Any) -
                 near[place, w + one] |= above
 
 
-@inlined()
+@inlined
 def _look_to(
     last: int,
     video: Any,
@@ -309,7 +309,7 @@ def _look_to(
     return count, True
 
 
-@inlined()
+@inlined
 def _look_at(
     row: int,
     slot: int,
@@ -340,7 +340,7 @@ def _look_at(
     return count
 
 
-@inlined()
+@inlined
 def _choose(row: int, seeds: Any, growth: Any, near: Any, bits: Any, box: Any, marks: Any, budget: Any) -> bool:
     """Write the cells of the row that count; False when there are none."""
     anything = np.uint64(0)

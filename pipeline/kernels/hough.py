@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from pipeline.kernels.compiled import allocating
 
 Floats = NDArray[np.float64]
 
@@ -40,7 +41,7 @@ def peaks(votes: Floats, many: int, apart: float) -> list[tuple[float, float]]:
     return made
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _vote(weights: Any, width: float, down: float, right: float, out: Any) -> None:
     angles, middle = out.shape[0], out.shape[1] // 2
     sine, cosine = np.empty(angles), np.empty(angles)

@@ -13,8 +13,9 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from pipeline.kernels.compiled import allocating
 
 Floats = NDArray[np.float64]
 Templates = NDArray[np.float32]
@@ -72,7 +73,7 @@ def _corners(shape: Planform) -> Floats:
     )
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _inside(forward: float, right: float, parts: Floats) -> bool:
     across = abs(right)
     for k in range(parts.shape[0]):
@@ -86,14 +87,14 @@ def _inside(forward: float, right: float, parts: Floats) -> bool:
     return False
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _weights(sigma: float, step: float) -> Any:
     reach = int(3.0 * sigma / step) + 1
     made = np.exp(-0.5 * ((np.arange(2 * reach + 1) - reach) * step / sigma) ** 2)
     return made / made.sum()
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _templates(parts: Floats, step: float, deep_sigma: float, sigmas: Floats, contrast: float, out: Templates) -> None:
     count, pixels = out.shape[1], out.shape[2]
     deep = _weights(deep_sigma, step)
@@ -111,7 +112,7 @@ def _templates(parts: Floats, step: float, deep_sigma: float, sigmas: Floats, co
             _widened(blurred, _weights(sigmas[ring], step), contrast, out[ring, a])
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _rasterise(parts: Floats, step: float, heading: float, out: Floats) -> None:
     """Part of each pixel that the outline covers, by nine points."""
     sine, cosine = np.sin(heading), np.cos(heading)
@@ -128,7 +129,7 @@ def _rasterise(parts: Floats, step: float, heading: float, out: Floats) -> None:
             out[i, j] = hits / 9
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _widened(blurred: Floats, wide: Floats, contrast: float, out: Templates) -> None:
     """Blurred across, in decibels, of norm 1."""
     pixels, reach = blurred.shape[0], len(wide) // 2

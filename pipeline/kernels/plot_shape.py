@@ -125,7 +125,7 @@ class PlotColumns:
         return Plots._of_good(made)
 
 
-@inlined()
+@inlined
 def position_variance(
     total: int, excess: float, radial: float, ground: float, constants: Any
 ) -> tuple[float, float, float, float]:
@@ -151,7 +151,7 @@ def position_variance(
     return share, step * step * part + pull * pull + GLINT, (distance * beam) ** 2 * part + GLINT, independent
 
 
-@inlined()
+@inlined
 def measure_run(one: Any, turn: Any, geometry: Any, out: Any, at: int) -> None:
     """Fill row `at` of the output from a plot of a single run, too small for an axis (see measure_plot)."""
     constants, ground, sums = geometry
@@ -196,7 +196,7 @@ def measure_run(one: Any, turn: Any, geometry: Any, out: Any, at: int) -> None:
     window[at, 3] = total
 
 
-@inlined()
+@inlined
 def measure_plot(root: int, newest: int, runs: Any, turn: Any, geometry: Any, out: Any, at: int) -> None:
     """Fill row `at` of the output from a component.
 
@@ -315,7 +315,7 @@ def measure_plot(root: int, newest: int, runs: Any, turn: Any, geometry: Any, ou
     window[at, 3] = last_cell - first_cell
 
 
-@inlined()
+@inlined
 def _axis(ax: float, ay: float, middle: float, half: float, least: float, independent: float) -> tuple[float, float]:
     """Direction (0 .. pi) and standard deviation of the long axis; nan where the cells do not tell."""
     major, minor = middle + half, max(middle - half, least)
@@ -327,7 +327,7 @@ def _axis(ax: float, ay: float, middle: float, half: float, least: float, indepe
     return np.arctan2(ax, ay) % np.pi, deviation
 
 
-@inlined()
+@inlined
 def _small_angle(sine: float, cosine: float) -> Any:
     """arctan2; by its series where that is exact to rounding, as it is for all plots but the very near."""
     if abs(sine) > 0.03 * cosine or cosine <= 0:

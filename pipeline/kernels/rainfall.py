@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from pipeline.kernels.bits import borrowed
+from pipeline.kernels.compiled import allocating, unchecked_division
 
 DRY = -1000.0
 """Rain of no power, in steps."""
@@ -20,7 +20,7 @@ ALARM = 8.0
 allowed."""
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@unchecked_division
 def rise_together(rule: Any, layout: Any, patches: Any) -> None:
     """Raise the darkest patches by what they rose together with those near by, which is told sooner than by one."""
     near, lowest, boost = layout[5], patches[7], patches[12]
@@ -45,7 +45,7 @@ def rise_together(rule: Any, layout: Any, patches: Any) -> None:
             level[lowest[m]] += boost[m]
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@unchecked_division
 def fall_of_rain(rule: Any, layout: Any, patches: Any) -> None:
     """How hard it rains on each macro-cell, by the rise of its darkest patch, and the other patches raised by that: the
     power of rain adds to that of the ground. All limits are raised by what it will be if it grows on as it did."""
@@ -80,7 +80,7 @@ def fall_of_rain(rule: Any, layout: Any, patches: Any) -> None:
         rain[m] = _fading(rain[m], own[source[m]], to_power)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _fading(before: Any, told: Any, to_power: Any) -> Any:
     """Rain is believed to grow as told, and to fade by a quarter of what is told: faint rain is told by fits."""
     if told >= before:
@@ -89,7 +89,7 @@ def _fading(before: Any, told: Any, to_power: Any) -> Any:
     return kept if kept > np.float32(UNSEEN) else np.float32(DRY)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def find_sources(layout: Any, heard: Any, dry: Any, lowest: Any, source: Any, rain: Any) -> None:
     """The darkest telling patch of each macro-cell, and the macro-cell near it whose darkest patch tells most of its
     rain: dark and near. Where it rains they stay: another would tell of other rain, and the levels would jump."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
+from pipeline.kernels.compiled import allocating
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def take_row(cells: Any, absolute: int, ring: Any, ring_row: Any, near: int, stack: Any) -> Any:
     """Lay out a sweep and those remembered before it, and remember it.
 

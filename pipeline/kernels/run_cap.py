@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from pipeline.kernels.bits import bits_above_raised, bits_of_row, count_runs
+from pipeline.kernels.compiled import allocating
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class CapSettings:
         return cls(refill=max_runs / azimuths, depth=max(max_runs / 4, 1.0))
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def detect_row(
     cells: Any, limits: Any, growth: Any, bits: Any, grown: Any, cap: Any, budget: Any, degraded: Any, tail: Any
 ) -> None:
@@ -52,7 +52,7 @@ def detect_row(
             grow_row(cells, growth.ctypes.data, bits, grown, tail)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def grow_row(cells: Any, limits_at: int, bits: Any, grown: Any, tail: Any) -> None:
     """Fill grown with the cells that exceed the limits at the address, and those of bits; the rest as in
     `bits_of_row`."""
@@ -61,7 +61,7 @@ def grow_row(cells: Any, limits_at: int, bits: Any, grown: Any, tail: Any) -> No
         grown[w] |= bits[w]
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def fit_row(cells: Any, limits_at: int, mask: Any, budget: Any, tail: Any) -> None:
     """Take the runs of one row out of the bucket; they do not fit, so the limits are raised until they do.
 
@@ -82,7 +82,7 @@ def fit_row(cells: Any, limits_at: int, mask: Any, budget: Any, tail: Any) -> No
     budget[0] -= count_runs(mask)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _raise(cells: Any, limits_at: int, mask: Any, tail: Any, raised: int) -> None:
     step = np.uint64(raised)
     whole = cells.size // 64

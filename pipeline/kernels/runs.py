@@ -40,7 +40,7 @@ greatest and least of the log amplitudes."""
 FREE = -1
 
 
-@inlined()
+@inlined
 def find(runs: Any, run: Any) -> Any:
     """The root of a run's component: its oldest run."""
     at = np.uintp(run)  # unsigned, here and below: numba would ask of a signed index whether it counts from the end
@@ -53,7 +53,7 @@ def find(runs: Any, run: Any) -> Any:
         at = np.uintp(above)
 
 
-@inlined()
+@inlined
 def unite(runs: Any, a: Any, b: Any, row: Any) -> Any:
     """Make one component of those of two different roots; row: the newest row, to which one of them belongs.
 
@@ -72,7 +72,7 @@ def unite(runs: Any, a: Any, b: Any, row: Any) -> Any:
     return a
 
 
-@inlined()
+@inlined
 def count_set(bits: Any, start: int, end: int) -> Any:
     """How many of the bits start .. end - 1 of a row of words are set."""
     everything = np.uint64(0xFFFFFFFFFFFFFFFF)
@@ -86,7 +86,7 @@ def count_set(bits: Any, start: int, end: int) -> Any:
     return found
 
 
-@inlined()
+@inlined
 def filled_from(bits: Any, block: int) -> Any:
     """Bit w is set when word block + w of a row of words is not empty, for the next eight or what is left."""
     if block + 8 <= bits.size:
@@ -97,7 +97,7 @@ def filled_from(bits: Any, block: int) -> Any:
     return filled
 
 
-@inlined()
+@inlined
 def edges_of(bits: Any, edges: Any) -> Any:
     """Write where the runs of one row of words begin and end (first, one past the last, and so on); gives how many
     numbers."""
@@ -135,7 +135,7 @@ def edges_of(bits: Any, edges: Any) -> Any:
     return many
 
 
-@inlined()
+@inlined
 def find_runs(
     bits: Any, seeds: Any, grown: bool, cells: Any, row: int, rule: Any, scale: Any, runs: Any, head: int, room: int
 ) -> tuple[int, int]:

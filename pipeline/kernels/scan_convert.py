@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from pipeline.kernels.compiled import allocating
 from pipeline.sites import RadarSite
 from pipeline.state import read_only
 from pipeline.tables import Plots
@@ -68,7 +68,7 @@ def plot_images(
     return out
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def convert(amplitude: Any, grid: Any, image: Any, out: Any) -> None:
     """As scan_converted. image: east, north of the centre, step, up, outside. out: (n, m) float32."""
     first_azimuth, azimuth_step, first_range, range_step, height = grid

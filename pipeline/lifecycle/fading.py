@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from pipeline.kernels.compiled import allocating
 from pipeline.tables import TrackPhase
 from pipeline.tables.arrays import Array, Floats
 
@@ -64,7 +64,7 @@ class Fading:
         return made.astype(np.uint8), silent | missed | ~(position_sd <= self.max_position_sd)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _two_points(
     state: Floats, cov: Floats, dt: Floats, position: Floats, noise: Floats, out_state: Floats, out_cov: Floats
 ) -> None:

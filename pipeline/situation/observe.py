@@ -7,7 +7,7 @@ arrival prediction of runway monitors: fast, along the centreline, approaching, 
 from __future__ import annotations
 
 from collections.abc import Set
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,43 +33,17 @@ def observe(
     landed: Set[int] = frozenset(),
 ) -> Situation:
     """Look at the tracks. Rows with states that are not finite must have been left out. `entries` is empty."""
-    s = settings
-    velocity = np.ascontiguousarray(tracks.state[:, 2:4])
-    speed = np.hypot(velocity[:, 0], velocity[:, 1])
-    lead = np.where(speed > s.roll_speed, np.clip(time - tracks.time, 0.0, s.lead_s), 0.0)
-    position = tracks.state[:, :2] + velocity * lead[:, None]
-    sd = _largest_deviation(tracks.covariance)
-    known_height = np.isfinite(tracks.altitude)
-    height = np.where(known_height, tracks.altitude, 0.0)
-    usable = (tracks.phase != TrackPhase.TENTATIVE) | ((tracks.sources & (Source.NODE | Source.REPORT)) != 0)
-    steady = (tracks.hits >= s.mover_hits) & (speed > s.mover_sd * _largest_deviation(tracks.covariance[:, 2:, 2:]))
-    credible = usable & steady & ((tracks.category != TargetClass.VEHICLE) | (speed > s.vehicle_speed))
-
-    along, across = frames.project(position)
-    speed_along, speed_across = frames.resolve(velocity)
-    way = (speed_along < 0).astype(np.int8)
-    length, half = frames.length[:, None], frames.half_width[:, None]
-    on_strip = (along >= -30) & (along <= length + 30) & (np.abs(across) <= half + s.strip_margin_m)
-    remaining = np.where(way == 0, frames.threshold[:, :1] - along, along - frames.threshold[:, 1:])
-    corridor = half + s.corridor_m + np.abs(remaining) * np.tan(np.radians(s.corridor_deg))
-    on_course = _aligned(speed_along, speed_across, s.arrival_alignment_deg) & (np.abs(across) <= corridor)
-    low = height <= s.steep_m + np.maximum(remaining, 0) * np.tan(np.radians(s.steep_deg))
-    fast = credible & (speed > s.arrival_speed)
-    arrival = fast & on_course & low & (remaining > 0) & (remaining <= s.final_m) & ~on_strip
-    distance = np.where(arrival, remaining, np.nan)
-    rolling = credible & on_strip & (np.abs(speed_along) > s.roll_speed) & (height <= s.airborne_m)
-    rolling &= _aligned(speed_along, speed_across, s.roll_alignment_deg)
-    beyond = np.where(way == 0, along - length, -along)
-    outbound = fast & on_course & ~on_strip & (beyond > 0) & (beyond < s.final_m / 3)
-
-    depth = np.stack([frames.depth(r, state.visibility, position) for r, state in enumerate(runways)] or [along])
-    on_final = arrival.any(axis=0)
-    outward = (np.sign(across) * speed_across) > s.vacating_speed
-    vacating = (depth > 0) & ~on_strip & outward
-    needed = np.clip(s.margin_sd * sd, s.margin_m, s.margin_most_m)
-    on_ground = np.where(known_height, (height <= s.airborne_m) | tracks.on_ground, True)
-    inside = (depth >= needed) | ((depth > 0) & on_strip)
-    occupant = usable & inside & ~vacating & on_ground & ~on_final & ~outbound.any(axis=0)
+    mobiles = _mobiles(tracks, time, settings)
+    motion = _motion(frames, mobiles, settings)
+    position, velocity, across = mobiles.position, mobiles.velocity, motion.across
+    depths = [frames.depth(r, state.visibility, position) for r, state in enumerate(runways)]
+    depth = np.stack(depths or [motion.along])
+    outward = (np.sign(across) * motion.speed_across) > settings.vacating_speed
+    vacating = (depth > 0) & ~motion.on_strip & outward
+    needed = np.clip(settings.margin_sd * mobiles.sd, settings.margin_m, settings.margin_most_m)
+    inside = (depth >= needed) | ((depth > 0) & motion.on_strip)
+    flying = motion.arrival.any(axis=0) | motion.outbound.any(axis=0)
+    able = mobiles.usable & mobiles.on_ground
     return Situation(
         airport=airport,
         tracks=tracks,
@@ -81,27 +55,96 @@ def observe(
         degraded=degraded,
         position=position,
         velocity=velocity,
-        speed=speed,
-        sd=sd,
-        usable=usable,
-        certain=(tracks.phase == TrackPhase.CONFIRMED) & (tracks.hits >= 5) & (sd < 12.0),
+        speed=mobiles.speed,
+        sd=mobiles.sd,
+        usable=mobiles.usable,
+        certain=(tracks.phase == TrackPhase.CONFIRMED) & (tracks.hits >= 5) & (mobiles.sd < 12.0),
         landed=np.isin(tracks.id, list(landed)),
+        **motion._asdict(),
+        time_to_threshold=motion.distance_to_threshold / np.maximum(np.abs(motion.speed_along), 1e-3),
+        depth=depth,
+        vacating=vacating,
+        occupant=able & inside & ~vacating & ~flying,
+        entering=_entering(frames, runways, settings, mobiles, able, depth, outward),
+        entries={},
+    )
+
+
+class _Mobiles(NamedTuple):
+    """What does not depend on a runway. (N, 2) position, velocity, else (N,); height: m over the airport, 0 where it
+    is not known. credible: what it says of its motion may be believed."""
+
+    position: Array
+    velocity: Array
+    speed: Array
+    sd: Array
+    height: Array
+    usable: Array
+    credible: Array
+    on_ground: Array
+
+
+def _mobiles(tracks: Tracks, time: float, s: SituationSettings) -> _Mobiles:
+    velocity = np.ascontiguousarray(tracks.state[:, 2:4])
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])
+    lead = np.where(speed > s.roll_speed, np.clip(time - tracks.time, 0.0, s.lead_s), 0.0)
+    known_height = np.isfinite(tracks.altitude)
+    height = np.where(known_height, tracks.altitude, 0.0)
+    usable = (tracks.phase != TrackPhase.TENTATIVE) | ((tracks.sources & (Source.NODE | Source.REPORT)) != 0)
+    steady = (tracks.hits >= s.mover_hits) & (speed > s.mover_sd * _largest_deviation(tracks.covariance[:, 2:, 2:]))
+    return _Mobiles(
+        position=tracks.state[:, :2] + velocity * lead[:, None],
+        velocity=velocity,
+        speed=speed,
+        sd=_largest_deviation(tracks.covariance),
+        height=height,
+        usable=usable,
+        credible=usable & steady & ((tracks.category != TargetClass.VEHICLE) | (speed > s.vehicle_speed)),
+        on_ground=np.where(known_height, (height <= s.airborne_m) | tracks.on_ground, True),
+    )
+
+
+class _Motion(NamedTuple):
+    """Place and motion in the frame of each runway, (R, N), named as in Situation."""
+
+    along: Array
+    across: Array
+    speed_along: Array
+    speed_across: Array
+    way: Array
+    on_strip: Array
+    arrival: Array
+    distance_to_threshold: Array
+    rolling: Array
+    outbound: Array
+
+
+def _motion(frames: RunwayFrames, mobiles: _Mobiles, s: SituationSettings) -> _Motion:
+    along, across = frames.project(mobiles.position)
+    speed_along, speed_across = frames.resolve(mobiles.velocity)
+    way = (speed_along < 0).astype(np.int8)
+    length, half = frames.length[:, None], frames.half_width[:, None]
+    on_strip = (along >= -30) & (along <= length + 30) & (np.abs(across) <= half + s.strip_margin_m)
+    remaining = np.where(way == 0, frames.threshold[:, :1] - along, along - frames.threshold[:, 1:])
+    corridor = half + s.corridor_m + np.abs(remaining) * np.tan(np.radians(s.corridor_deg))
+    on_course = _aligned(speed_along, speed_across, s.arrival_alignment_deg) & (np.abs(across) <= corridor)
+    low = mobiles.height <= s.steep_m + np.maximum(remaining, 0) * np.tan(np.radians(s.steep_deg))
+    fast = mobiles.credible & (mobiles.speed > s.arrival_speed)
+    arrival = fast & on_course & low & (remaining > 0) & (remaining <= s.final_m) & ~on_strip
+    on_runway = mobiles.credible & on_strip & (mobiles.height <= s.airborne_m)
+    along_runway = (np.abs(speed_along) > s.roll_speed) & _aligned(speed_along, speed_across, s.roll_alignment_deg)
+    beyond = np.where(way == 0, along - length, -along)
+    return _Motion(
         along=along,
         across=across,
         speed_along=speed_along,
         speed_across=speed_across,
         way=way,
-        depth=depth,
         on_strip=on_strip,
         arrival=arrival,
-        time_to_threshold=distance / np.maximum(np.abs(speed_along), 1e-3),
-        distance_to_threshold=distance,
-        rolling=rolling,
-        outbound=outbound,
-        vacating=vacating,
-        occupant=occupant,
-        entering=_entering(frames, runways, settings, position, velocity, speed, usable & on_ground, depth, outward),
-        entries={},
+        distance_to_threshold=np.where(arrival, remaining, np.nan),
+        rolling=on_runway & along_runway,
+        outbound=fast & on_course & ~on_strip & (beyond > 0) & (beyond < s.final_m / 3),
     )
 
 
@@ -119,13 +162,12 @@ def _entering(
     frames: RunwayFrames,
     runways: tuple[RunwayState, ...],
     s: SituationSettings,
-    position: Array,
-    velocity: Array,
-    speed: Array,
+    mobiles: _Mobiles,
     able: Array,
     depth: Array,
     outward: Array,
 ) -> Array:
+    position, velocity, speed = mobiles.position, mobiles.velocity, mobiles.speed
     entering = np.zeros(depth.shape, bool)
     rows = np.nonzero(able & (speed > 3.0) & (speed < s.arrival_speed))[0]
     if not len(rows):

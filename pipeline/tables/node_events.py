@@ -27,3 +27,4 @@ class NodeEvents(Table):
     length: Array = column("f4", "m", "magnetic length of what passed; nan when not measured", default=float("nan"))
     strength: Array = column("f4", "", "signal strength relative to the node's threshold", default=1.0)
     simulated: Array = column("?", "", "made by a simulator", default=False)
+    arrival: Array = column("f8", "s", "UTC when it arrived at this host; nan when unknown", default=float("nan"))

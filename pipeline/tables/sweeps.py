@@ -45,7 +45,8 @@ class Sweeps:
     radar: index of the radar in the engine. scan: counts the turns since start. row: (n,) int32 ascending position of
     each sweep in the azimuth grid, 0 .. azimuths-1 (a missing sweep is a missing row). azimuth: (n,) float64 rad from
     true north, centre of the sweep. time: (n,) float64 s UTC. amplitude: (n, ranges) uint8 log amplitude, C order.
-    last: this block ends its scan (the antenna passed north).
+    last: this block ends its scan (the antenna passed north). arrival: UTC s when the newest of it arrived at this
+    host; nan when unknown.
     Raises TableError when shapes or dtypes do not fit.
     """
 
@@ -56,6 +57,7 @@ class Sweeps:
     time: NDArray[np.float64]
     amplitude: NDArray[np.uint8]
     last: bool = False
+    arrival: float = float("nan")
 
     def __post_init__(self) -> None:
         n = len(self.row)

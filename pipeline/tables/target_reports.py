@@ -32,3 +32,4 @@ class TargetReports(Table):
     on_ground: Array = column("?", "", "the sender says that it is on the ground", default=True)
     category: Array = column("u1", "", "TargetCategory", default=0)
     simulated: Array = column("?", "", "made by a simulator", default=False)
+    arrival: Array = column("f8", "s", "UTC when it arrived at this host; nan when unknown", default=float("nan"))

@@ -234,6 +234,24 @@ def clear_identity(core: Core, rows: Array) -> None:
     table.on_ground[rows] = True
 
 
+TIME_COLUMNS = ("time", "updated", "born", *SOURCE_TIMES.values())
+"""The columns of the track table that hold UTC s."""
+
+
+def shift_times(core: Core, seconds: float) -> None:
+    """Everything that the tracker remembers becomes later by `seconds`."""
+    for name in TIME_COLUMNS:
+        core.column(name)[:] += seconds
+    for clock in core.clocks:
+        clock.time += seconds
+        clock.newest += seconds
+    core.waiting = [one.replace(time=one.time + seconds) for one in core.waiting]
+    core.numbers.free_at += seconds
+    core.time += seconds
+    core.lifecycle_time += seconds
+    core.maintenance_time += seconds
+
+
 def make_core(
     radars: Sequence[RadarSite], nodes: Sequence[NodeSite], zones: ZoneLookup, settings: TrackerSettings,
     capacity: int, filter: FilterPart, associate: AssociatePart, lifecycle: LifecyclePart, classify: ClassifyPart,

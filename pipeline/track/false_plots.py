@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from pipeline.kernels.compiled import allocating
 from pipeline.sites import RadarSite
 from pipeline.tables.arrays import Array, Floats
 
@@ -87,7 +87,7 @@ class FalsePlots:
         return np.asarray((place - (self.west, self.south)) / self.step - REACH)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _spread(cell: Floats, amount: Floats, rate: Floats) -> None:
     rows, columns = rate.shape
     for k in range(len(cell)):
@@ -102,7 +102,7 @@ def _spread(cell: Floats, amount: Floats, rate: Floats) -> None:
         rate[i + 1, j + 1] += amount[k] * v * u
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _read(cell: Floats, rate: Floats, out: Array) -> None:
     rows, columns = rate.shape
     for k in range(len(cell)):

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from pipeline.kernels.compiled import allocating
 from pipeline.sites import RadarSite
 from pipeline.tables.arrays import Array, Floats
 
@@ -124,7 +124,7 @@ def plan_looks(
     return made
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _plan(
     radar: Floats, closed_to: int, time: Floats, state: Floats, cov: Floats, extent: Floats, looked: Array,
     gate: float, max_gate: float, row: Array, at: Floats, guard: Floats, due: Array, covered: Array,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from pipeline.contracts.associate import Expected
+from pipeline.kernels.compiled import allocating
 from pipeline.tables import TargetCategory, TargetClass, TrackPhase
 from pipeline.tables.arrays import Array, Floats
 from pipeline.track.core import Core, clear_identity, end_tracks, update_lifecycle
@@ -109,7 +109,7 @@ def _end_fragments(core: Core) -> None:
     end_tracks(core, gone)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _duplicates(
     order: Array, state: Floats, cov: Floats, extent: Floats, name: Array, kind: Array, starved: Array, born: Floats,
     original: Array,

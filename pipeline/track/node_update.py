@@ -43,8 +43,8 @@ ALL_HITS, HISTORY_LOOKS = 0xFFFFFFFF, 32
 """A history of nothing but hits, and how many looks it holds."""
 
 
-def take_node_events(core: Core, events: NodeEvents) -> None:
-    """Each event pulls and confirms the track that it fits best, or starts one."""
+def take_node_events(core: Core, events: NodeEvents) -> NodeEvents:
+    """Each event pulls and confirms the track that it fits best, or starts one. Gives those that were taken."""
     known = (events.node >= 0) & (events.node < len(core.nodes))
     core.count("node_unknown", int((~known).sum()))
     events = events[known]
@@ -53,6 +53,7 @@ def take_node_events(core: Core, events: NodeEvents) -> None:
         _apply_event(core, events, int(event))
         core.time = max(core.time, float(events.time[event]))
     update_lifecycle(core)
+    return events
 
 
 def _apply_event(core: Core, events: NodeEvents, event: int) -> None:

@@ -53,10 +53,13 @@ MISS_TOLERANCE_S = 0.5
 turn."""
 
 
-def take_sector(core: Core, sector: SectorPlots) -> None:
-    """Work on what one radar closed: tracks whose whole gate is closed take a plot or miss; the rest starts tracks."""
+def take_sector(core: Core, sector: SectorPlots) -> bool:
+    """Work on what one radar closed: tracks whose whole gate is closed take a plot or miss; the rest starts tracks.
+
+    False, counted by reason, when the sector cannot be taken.
+    """
     if not _acceptable(core, sector):
-        return
+        return False
     site, clock = core.radars[sector.radar], core.clocks[sector.radar]
     clock.heard(sector.closed_to, sector.time, site.video.azimuths, site.video.period_s)
     core.false_plots[sector.radar].turn(sector.closed_to, site.video.azimuths)
@@ -74,6 +77,7 @@ def take_sector(core: Core, sector: SectorPlots) -> None:
         plots, rows = plots[~stale], rows[~stale]
     wait = _process(core, sector, plots, rows)
     core.waiting[sector.radar] = plots[wait] if wait.any() else NO_PLOTS
+    return True
 
 
 def _acceptable(core: Core, sector: SectorPlots) -> bool:

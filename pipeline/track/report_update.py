@@ -35,14 +35,15 @@ SPEED_SD, SPEED_SD_SHARE = 2.0, 0.05
 3 m/s with 95 %, and the course is rounded."""
 
 
-def take_target_reports(core: Core, reports: TargetReports) -> None:
-    """Take reports in order of time; those of one address one after the other."""
+def take_target_reports(core: Core, reports: TargetReports) -> int:
+    """Take reports in order of time; those of one address one after the other. How many were in time and in reach."""
     reports = _usable(core, reports)
     reports = reports[np.argsort(reports.time, kind="stable")]
     turn = _occurrence(reports.address)
     for number in range(int(turn.max()) + 1 if len(turn) else 0):
         _take_round(core, reports[turn == number])
     update_lifecycle(core)
+    return len(reports)
 
 
 def _usable(core: Core, reports: TargetReports) -> TargetReports:

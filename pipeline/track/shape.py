@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from pipeline.kernels.compiled import allocating
 from pipeline.tables import Plots
 from pipeline.tables.arrays import Array, Floats
 from pipeline.track.settings import ExtentSettings
@@ -83,7 +83,7 @@ def reshape(
     )  # fmt: skip
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _plot_extents(
     length: Array,
     width: Array,
@@ -106,7 +106,7 @@ def _plot_extents(
         out[k, 2] = direction
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _extents(
     length: Floats, width: Floats, heading: Floats, axis_bearing: Floats, least_half_extent: Floats, out: Floats
 ) -> None:
@@ -118,7 +118,7 @@ def _extents(
         out[k, 2] = direction if math.isfinite(direction) else 0.0
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _add_centroid_noise(extent: Floats, centroid_sd: float, noise: Floats) -> None:
     for k in range(len(extent)):
         direction = extent[k, 2]
@@ -132,19 +132,19 @@ def _add_centroid_noise(extent: Floats, centroid_sd: float, noise: Floats) -> No
         noise[k, 1, 0] += (along - across) * s * c
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _axis_difference(a: float, b: float) -> float:
     """a - b of two directions without sense, in (-pi/2, pi/2]."""
     return (a - b + 0.5 * math.pi) % math.pi - 0.5 * math.pi
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _turn(a: float, b: float) -> float:
     """a - b of two directions, in (-pi, pi]."""
     return (a - b + math.pi) % (2 * math.pi) - math.pi
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _reshape(
     rule: Floats, rows: Array, state: Floats, cov: Floats, moved: Array, plot: Floats, bearing_sd: Array,
     length: Floats, width: Floats, heading: Floats, axis_bearing: Floats, moving: Array, extent_count: Array,

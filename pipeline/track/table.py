@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -150,19 +151,24 @@ class TrackTable:
         self.n, self.last_uid = n, int(saved["last_uid"])
 
 
+LAST_NUMBER = 4095
+"""The greatest track number: ASTERIX CAT010 has 12 bits for it (I010/161)."""
+
+
+@dataclass(slots=True, eq=False)
 class TrackNumbers:
     """Numbers 1 .. 4095 given in turn, so that the longest unused comes next.
 
     rest: s for which a number stays unused after its track ended, so that a controller does not take one target for
-    another; two minutes, as 4095 numbers suffice for it. LAST: ASTERIX CAT010 has 12 bits for it (I010/161).
+    another; two minutes, as 4095 numbers suffice for it. free_at: (4096,) UTC s from which each number may be given
+    again; infinite while a track bears it.
     """
 
-    LAST = 4095
+    LAST: ClassVar[int] = LAST_NUMBER
 
-    def __init__(self, rest: float = 120.0) -> None:
-        self.rest = rest
-        self.next = 1
-        self.free_at = np.full(self.LAST + 1, NEVER)
+    rest: float = 120.0
+    next: int = 1
+    free_at: Array = field(default_factory=lambda: np.full(LAST_NUMBER + 1, NEVER))
 
     def take(self, time: float) -> int:
         """The next free number, 0 when none is free."""

@@ -17,7 +17,7 @@ from pipeline.contracts.lifecycle import LifecyclePart
 from pipeline.sites import NodeSite, RadarSite
 from pipeline.tables import NodeEvents, Plots, SectorPlots, TargetReports, TrackPhase, Tracks
 from pipeline.tables.arrays import Array
-from pipeline.track.core import SOURCE_TIMES, Core, ZoneLookup, make_core, update_lifecycle
+from pipeline.track.core import SOURCE_TIMES, Core, ZoneLookup, make_core, shift_times, update_lifecycle
 from pipeline.track.maintenance import maintain_tracks
 from pipeline.track.node_update import take_node_events
 from pipeline.track.radar_update import PAVED, SETTLED, take_sector
@@ -66,18 +66,19 @@ class Tracker:
         """UTC s of the newest that was taken; minus infinity before."""
         return self._core.time
 
-    def sector(self, sector: SectorPlots) -> None:
-        """Take the plots of one sector: a whole turn, 1/32 of one, or any part."""
-        take_sector(self._core, sector)
+    def sector(self, sector: SectorPlots) -> bool:
+        """Take the plots of one sector: a whole turn or any part of one. False, counted, when it cannot be taken."""
+        taken = take_sector(self._core, sector)
         maintain_tracks(self._core)
+        return taken
 
-    def node_events(self, events: NodeEvents) -> None:
-        """Take node events: they confirm, pull or start tracks near the node."""
-        take_node_events(self._core, events)
+    def node_events(self, events: NodeEvents) -> NodeEvents:
+        """Take node events: they confirm, pull or start tracks near the node. Gives those that were taken."""
+        return take_node_events(self._core, events)
 
-    def target_reports(self, reports: TargetReports) -> None:
-        """Take target reports: they name, pull or start tracks."""
-        take_target_reports(self._core, reports)
+    def target_reports(self, reports: TargetReports) -> int:
+        """Take target reports: they name, pull or start tracks. How many were in time and in reach."""
+        return take_target_reports(self._core, reports)
 
     def advance(self, time: float) -> None:
         """Let time pass: tracks coast and end although the sensors are silent. Time that runs back is counted."""
@@ -90,6 +91,10 @@ class Tracker:
             core.time = time
             core.lifecycle_time = min(core.lifecycle_time, time - 1.0)
             maintain_tracks(core)
+
+    def shift(self, seconds: float) -> None:
+        """The clock that all times come from was set: everything remembered becomes later by `seconds`."""
+        shift_times(self._core, seconds)
 
     def tracks(self, time: float | None = None) -> Tracks:
         """The confirmed and coasting tracks that are shown, in order of birth.

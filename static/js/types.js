@@ -79,6 +79,8 @@
  * @property {string} detail
  * @property {Record<string, number>} counters
  * @property {Record<string, string>} [parts]  of a radar: the methods that work on its video, by verb
+ * @property {number|null} [clock_offset_s]  its clock less the time of arrival; positive is ahead
+ * @property {number|null} [clock_spread_s]
  */
 
 /**

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from app import kernel_cache
 
 ASK = "import app, os; print(os.environ['NUMBA_CACHE_DIR'])"
@@ -38,3 +40,62 @@ def test_old_folders_go_and_the_newest_stay(tmp_path: Path) -> None:
         os.utime(tmp_path / f"old{number}", (number, number))
     folder(NUMBA_CACHE_DIR=str(tmp_path))
     assert {one.name for one in tmp_path.iterdir() if one.name.startswith("old")} == {"old3", "old4", "old5"}
+
+
+def test_every_file_that_names_numba_or_a_decorator_of_kernels_counts() -> None:
+    counted = {path.relative_to(kernel_cache.ROOT).as_posix() for path in kernel_cache.kernel_sources()}
+    for known in ("compiled", "bits", "tiles", "adaptive", "growth", "correlate", "recent_rows", "component_state"):
+        assert f"pipeline/kernels/{known}.py" in counted
+    assert {"pipeline/detect/ca.py", "pipeline/track/look.py", "app/ingest/socket_kernel.py"} <= counted
+    assert "pipeline/detect/macro_cells.py" in counted  # its constants are compiled into the kernels of `hybrid`
+    assert "pipeline/detect/calibration.py" not in counted
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("pipeline/kernels/compiled.py", "from numba import njit\n"),
+        ("pipeline/track/look.py", "from pipeline.kernels.compiled import allocating\n"),
+        ("pipeline/kernels/bits.py", "from numba import extending\n"),
+        ("app/ingest/socket_kernel.py", "import numba\n"),
+    ],
+)
+def test_a_changed_kernel_gets_a_new_folder(name: str, text: str, tmp_path: Path) -> None:
+    for one in ("pipeline/kernels/compiled.py", "app/ingest/socket_kernel.py", "pipeline/sites.py", name):
+        (tmp_path / one).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / one).write_text("")
+    (tmp_path / name).write_text(text)
+    before = kernel_cache._digest(tmp_path)
+    (tmp_path / "pipeline/sites.py").write_text("MOST = 3\n")
+    assert kernel_cache._digest(tmp_path) == before
+    (tmp_path / name).write_text(text + "LEAST = 2\n")
+    assert kernel_cache._digest(tmp_path) != before
+
+
+def test_a_changed_constant_of_another_file_gets_a_new_folder(tmp_path: Path) -> None:
+    files = {
+        "app/ingest/socket_kernel.py": "",
+        "pipeline/kernels/one.py": "import numpy\n\nfrom pipeline.kernels.compiled import kernel\n"
+        "from pipeline.limits import MOST\nfrom pipeline.many import (\n    least,\n    LEAST,\n)\n"
+        "from pipeline.names import Name, name\n",
+        "pipeline/limits.py": "MOST = 1\n",
+        "pipeline/many/__init__.py": "LEAST = 1\n",
+        "pipeline/names.py": "class Name: ...\n",
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    counted = [path.relative_to(tmp_path).as_posix() for path in kernel_cache.kernel_sources(tmp_path)]
+    assert counted == ["pipeline/kernels/one.py", "pipeline/limits.py", "pipeline/many/__init__.py"]
+    before = kernel_cache._digest(tmp_path)
+    (tmp_path / "pipeline/limits.py").write_text("MOST = 2\n")
+    assert kernel_cache._digest(tmp_path) != before
+
+
+def test_a_folder_dated_in_the_future_does_not_outlive_the_others(tmp_path: Path) -> None:
+    for name, at in (("old1", 1.0), ("old2", 2.0), ("old3", 3.0), ("wrong", 4_080_000_000.0)):
+        (tmp_path / name).mkdir()
+        os.utime(tmp_path / name, (at, at))
+    folder(NUMBA_CACHE_DIR=str(tmp_path))
+    assert not (tmp_path / "wrong").exists()
+    assert (tmp_path / "old1").exists()

@@ -15,10 +15,11 @@ from app.api.application import create_app
 from app.contract import Refused
 from app.ingest.octets import encode_sweeps
 from app.live.hub import Hub
+from app.runtime.host_clock import HostClock
 from app.service import SurfaceService
 from app.settings import PartSettings, PartsSettings, RadarSettings, Settings
 from pipeline.picture import SensorState
-from tests.app.runtime.small_radar import AZIMUTHS, RANGES, VIDEO, small_site, turn
+from tests.app.runtime.small_radar import AZIMUTHS, RANGES, T0, VIDEO, small_site, turn
 from tests.support.running import until
 from tests.support.small_airport import as_geojson, small_airport
 
@@ -40,7 +41,9 @@ class Radar:
         )  # fmt: skip
         settings = Settings(data_dir=folder, view3d=False, radars=(radar,), parts=PartsSettings(detect=detect))
         airport = small_airport()
-        self.service = SurfaceService(settings, airport, as_geojson(airport))
+        self.now = T0
+        host = HostClock(lambda: self.now, lambda: self.now)
+        self.service = SurfaceService(settings, airport, as_geojson(airport), host)
         self.service.prepare()
         self.service.start()
         self.scan = 0
@@ -52,6 +55,7 @@ class Radar:
         before = self.state().counters["plots"]
         for _ in range(many):
             for block in turn(self.scan, **how):
+                self.now = float(block.time[-1])
                 self.service.submit_sweeps("smr-1", encode_sweeps(block, small_site()))
             self.scan += 1
             until(lambda: self.state().counters["sweeps"] == self.scan * AZIMUTHS, "the turn is worked on")

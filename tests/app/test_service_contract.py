@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.contract import Refused, Service, UnknownId, WrongParts
+from app.contract import Refused, RefusedTime, Service, UnknownId, WrongParts
 from app.ingest.octets import encode_sweeps
 from app.service import SurfaceService
 from app.settings import LimitsSettings, NodeSettings, PartSettings, PartsSettings, RadarSettings, Settings
@@ -362,8 +362,19 @@ class ServiceContract:
                 rig.service.submit_sweeps(HEARD, wrong)
 
     def test_nothing_submitted_is_nothing_done(self, rig: Rig) -> None:
-        rig.service.submit_node_events(NodeEvents.empty())
-        rig.service.submit_target_reports(TargetReports.empty())
+        assert rig.service.submit_node_events(NodeEvents.empty()) == {"taken": 0}
+        assert rig.service.submit_target_reports(TargetReports.empty()) == {"taken": 0}
+
+    def test_what_is_dated_wrongly_is_refused_by_name_and_the_rest_is_taken(self, rig: Rig) -> None:
+        now = time.time()
+        with pytest.raises(RefusedTime, match="ahead") as told:
+            rig.service.submit_target_reports(report(time=now + 3600.0))
+        assert told.value.counts == {"ahead": 1}
+        both = TargetReports.build(2, time=np.array([now, now + 3600.0]), address="39ffff", east=1e6, north=0.0)
+        assert rig.service.submit_target_reports(both) == {"taken": 1, "refused_ahead": 1}
+        with pytest.raises(RefusedTime):
+            rig.service.submit_node_events(NodeEvents.build(1, time=now + 3600.0, node=0))
+        assert {one.status for one in rig.service.sensors() if one.kind in ("node", "report")} == {"degraded"}
 
     def test_events_of_unknown_nodes_do_not_stop_the_pictures(self, rig: Rig) -> None:
         rig.service.submit_node_events(NodeEvents.build(2, time=time.time(), node=np.array([-1, 99])))

@@ -50,7 +50,7 @@ def test_every_setting_stands_in_the_file() -> None:
     active = re.sub(r"(?m)^#(?=[a-z\[])", "", settings_file())
     document = tomllib.loads(active)
     assert set(document) == set(Settings.model_fields)
-    for name in ("feed", "limits", "storage", "demo", "mqtt"):
+    for name in ("feed", "limits", "storage", "demo", "mqtt", "clocks"):
         assert set(document[name]) == set(type(getattr(Settings(), name)).model_fields)
 
 

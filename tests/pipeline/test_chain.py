@@ -20,8 +20,8 @@ from pipeline.extract.hysteresis import Hysteresis
 from pipeline.extract.manhattan import Manhattan
 from pipeline.state import StateError
 from pipeline.tables import Plots, SectorPlots, Sweeps, TableError
-from tests.pipeline.contracts.front_end import assert_same_plots, busy_video
-from tests.support.video_scenes import SMALL, cut, site, strip
+from tests.pipeline.contracts.extract import assert_same_plots
+from tests.support.video_scenes import SMALL, busy_video, cut, site, strip
 
 EIGHTHS = range(0, 96, 12)
 

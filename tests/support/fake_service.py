@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 
 from app.assembly import FRONT_END, build_parts, chain_of
-from app.contract import FrontEnd, PictureListener, Readiness, Refused, UnknownId, Video
+from app.contract import FrontEnd, PictureListener, Readiness, Refused, RefusedTime, ReplayControl, UnknownId, Video
 from app.ingest.octets import OctetIntake
+from app.runtime.clocks import FeedTimes
 from app.runtime.front_end import FrontEndSwitch
 from app.runtime.radar_worker import RadarWorker, Turn
 from app.settings import RadarSettings, Settings
@@ -110,10 +111,15 @@ class FakeService:
         self._switches = {site.id: parts_on(site, index) for index, site in enumerate(self.radars)}
         self.cut: dict[str, str] = {}
         self.nodes = (NodeSite("node-1", -1450.0, -560.0, 2.6, hold="hold-w1", runway="06/24", simulated=True),)
+        self.replay: ReplayControl | None = None
         self.rate_hz = rate_hz
         self.node_events: list[NodeEvents] = []
         self.target_reports: list[TargetReports] = []
         self.sweeps: list[Sweeps] = []
+        self._times = {
+            "nodes": FeedTimes("event", self.settings.clocks.nodes, [one.id for one in self.nodes]),
+            "reports": FeedTimes("report", self.settings.clocks.reports),
+        }
         self._octets = {site.id: OctetIntake(site, index) for index, site in enumerate(self.radars)}
         self._waiting = 0
         self.ready = True
@@ -295,7 +301,12 @@ class FakeService:
     def sensors(self) -> tuple[SensorState, ...]:
         now = time.time()
         events, reports = (sum(map(len, tables)) for tables in (self.node_events, self.target_reports))
-        heard = (SensorState("reports", "report", "ok", now, counters={"taken": reports}),) if reports else ()
+        heard = SensorState("reports", "report", "ok", now, counters={"taken": reports})
+        others = (
+            self._times["nodes"].shown(SensorState("nodes", "node", "ok", now, True, counters={"taken": 7 + events})),
+        )
+        if reports or self._times["reports"].heard:
+            others += (self._times["reports"].shown(heard),)
         return (
             SensorState(
                 "smr-1", "radar", "degraded" if "smr-1" in self.cut else "ok", now, True, self.cut.get("smr-1", ""),
@@ -305,8 +316,7 @@ class FakeService:
                 "smr-2", "radar", "silent", now - 60, False, "nothing heard for 60 s", {"sweeps": 10},
                 self._switches["smr-2"].names,
             ),
-            SensorState("nodes", "node", "ok", now, True, counters={"taken": 7 + events}),
-            *heard,
+            *others,
         )  # fmt: skip
 
     def video(self, radar: str) -> Video:
@@ -390,21 +400,24 @@ class FakeService:
         self.sweeps += blocks
         return counted
 
-    def submit_node_events(self, events: NodeEvents) -> None:
-        self._take("nodes", events, self.node_events)
+    def submit_node_events(self, events: NodeEvents) -> dict[str, int]:
+        return self._take("nodes", events, self.node_events)
 
-    def submit_target_reports(self, reports: TargetReports) -> None:
-        self._take("reports", reports, self.target_reports)
+    def submit_target_reports(self, reports: TargetReports) -> dict[str, int]:
+        return self._take("reports", reports, self.target_reports)
 
-    def _take(self, kind: str, table: Any, tables: list[Any]) -> None:
-        if not len(table):
-            return
+    def _take(self, kind: str, table: Any, tables: list[Any]) -> dict[str, int]:
         self._started()
+        good, refused, why = self._times[kind].judge(table, time.time())
+        if refused and not len(good):
+            raise RefusedTime(why, refused)
         with self._lock:
             if self._waiting >= self.settings.limits.rows_queued:
                 raise Refused(f"the queue for {kind} is full")
-            self._waiting += 1
-            tables.append(table)
+            if len(good):
+                self._waiting += 1
+                tables.append(good)
+        return {"taken": len(good), **{f"refused_{reason}": count for reason, count in refused.items()}}
 
 
 def main() -> None:

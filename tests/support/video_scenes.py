@@ -4,14 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from hypothesis import HealthCheck
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from pipeline.sites import RadarSite
 from pipeline.tables import Detections, Sweeps, VideoFormat
 
 SMALL = VideoFormat(azimuths=96, ranges=150, range_step_m=6.0, beamwidth_rad=0.13)
+
+CUTS = st.lists(st.integers(1, 95), max_size=12)
+"""Places at which a scan of SMALL is cut into blocks, in any order."""
+
+INHERITED = [HealthCheck.differing_executors]
+"""One test run by several subclasses is what a contract is for."""
 
 
 def site(video: VideoFormat = SMALL, height: float = 0.0) -> RadarSite:
@@ -65,3 +74,15 @@ def false_alarm_share(limits: NDArray[np.uint8], mean_db: NDArray[np.float64], d
     """Exact chance, mean over the cells, that rounded Rayleigh amplitudes of these mean powers exceed these limits."""
     edge_db = (limits.astype(float) + 0.5) * db_per_step
     return float(np.where(limits == 255, 0.0, np.exp(-(10 ** ((edge_db - mean_db) / 10)))).mean())
+
+
+def busy_video(video: VideoFormat, scans: int, seed: int = 5) -> Any:
+    """Clutter of two levels with small bright targets that move, one of them across north."""
+    rng = np.random.default_rng(seed)
+    frames = rayleigh(rng, (scans, video.azimuths, video.ranges), 25.0)
+    frames[:, :, video.ranges // 2 :] = rayleigh(rng, (scans, video.azimuths, video.ranges - video.ranges // 2), 32.0)
+    for scan in range(scans):
+        for azimuth, cell in ((0, 40), (30 + scan, 70), (60, 20 + 2 * scan), (90 - scan, 110)):
+            rows = np.arange(azimuth - 2, azimuth + 3) % video.azimuths
+            frames[scan, rows, cell % (video.ranges - 4) : cell % (video.ranges - 4) + 4] = 220
+    return frames

@@ -16,12 +16,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 from scipy.special import gammaln
 
 from pipeline.airport.model import SurfaceKind
+from pipeline.kernels.compiled import allocating
 from pipeline.lab.evaluate.cfar_law import DB, Law, swerling3_draw
 from pipeline.tables import Sweeps, VideoFormat
 
@@ -292,7 +292,7 @@ def _gusts(chance: np.random.Generator) -> NDArray[np.float32]:
     return np.asarray(field / field.std(), np.float32)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _draw(mean: Any, bits: Any, main: Any, tail: Any, step: Any, out: Any) -> None:
     for i in range(mean.shape[0]):
         means, row, made = mean[i], bits[i], out[i]

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from pipeline.kernels.compiled import allocating
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ class Stopwatch:
         return BenchRow(name, float(median), float(times[:, 0].min()), float(median / floor), **more)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def read_once(frame: Any) -> int:
     """The sum of all bytes: the least that any work on a frame can take."""
     total = 0

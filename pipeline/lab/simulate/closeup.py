@@ -16,11 +16,11 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from shapely import Polygon, contains_xy, union_all
 from shapely.geometry.base import BaseGeometry
 
+from pipeline.kernels.compiled import allocating
 from pipeline.reference.types import TYPES, TargetType
 from pipeline.tables import TargetClass, VideoFormat
 
@@ -248,7 +248,7 @@ def _cells(east: Floats, north: Floats, grid: tuple[float, ...]) -> tuple[Floats
     return row, (np.hypot(east, north) - grid[4]) / grid[5] - grid[1]
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _speckle(white: Any, beam: float, field: Any) -> None:
     """Complex Gaussian clutter of mean power 1, correlated from row to row as the beam makes it. white: more rows."""
     rows, cells = field.shape[0], field.shape[1]
@@ -270,7 +270,7 @@ def _speckle(white: Any, beam: float, field: Any) -> None:
                 row[j, 1] += by * source[j, 1]
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _illuminate(east: Any, north: Any, strength: Any, phase: Any, grid: Any, echo: Any, power: Any) -> Any:
     """Add up the echoes, coherently and in power; the mean power at the scatterers is returned."""
     first_row, first_cell, azimuth_step, beam, first_range, step, pulse, azimuths = grid

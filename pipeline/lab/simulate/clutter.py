@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 from scipy.special import gammaln
 from shapely import STRtree, points
 
 from pipeline.airport.model import Airport, SurfaceKind
+from pipeline.kernels.compiled import allocating
 from pipeline.sites import RadarSite
 
 Floats = NDArray[np.float64]
@@ -204,7 +204,7 @@ def _height(properties: dict[str, object], default: float) -> float:
     return height if 1.0 <= height <= 150.0 else default
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _spread_shadows(row, cell, height, antenna, slant, built, slope):  # type: ignore[no-untyped-def]
     n = len(row)
     ranges = len(slant)

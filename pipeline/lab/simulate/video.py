@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.airport.model import Airport
+from pipeline.kernels.compiled import allocating
 from pipeline.lab.simulate.clutter import FINE, ClutterMap, PowerLaw, build_clutter, quantiles
 from pipeline.lab.simulate.paths import Truth
 from pipeline.lab.simulate.rain import RainCell, rain_power
@@ -134,7 +134,7 @@ class VideoSimulator:
             at = until
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _mix(x):  # type: ignore[no-untyped-def]
     """The finaliser of splitmix64: 64 well-mixed bits."""
     x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -142,19 +142,19 @@ def _mix(x):  # type: ignore[no-untyped-def]
     return x ^ (x >> np.uint64(31))
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _key(seed, scan, what):  # type: ignore[no-untyped-def]
     mixed = _mix(seed * np.uint64(0x9E3779B97F4A7C15) + scan)
     return _mix(mixed + what * np.uint64(0xD1342543DE82EF95) + np.uint64(1))
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _unit(x):  # type: ignore[no-untyped-def]
     """A number in (0, 1) from 64 bits."""
     return (np.float64(x >> np.uint64(12)) + 0.5) * (1.0 / 4503599627370496.0)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _illuminate(  # type: ignore[no-untyped-def]
     ids, east, north, altitude, heading, kind, length, width, models, first_centre, geometry, azimuths, first_row,
     rows, slope, seed, scan, swerling, echo, bounds,
@@ -239,7 +239,7 @@ def _illuminate(  # type: ignore[no-untyped-def]
                     row[np.uintp(j), 1] += np.float32(gain * im)
 
 
-@njit(nogil=True, cache=True)
+@allocating
 def _render(  # type: ignore[no-untyped-def]
     code, echo, bounds, rain, raining, main, tail, power_of, fine_per_db, noise_fine, seed, scan, first_row, fine, out
 ):

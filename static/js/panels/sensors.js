@@ -7,12 +7,19 @@ import { byId, el, keyed, setText } from './dom.js';
 
 /** Words in the name of a counter that mean loss or trouble; everything else is how much was done. */
 const TROUBLE = new Set(('lost late duplicate reordered dropped wrong malformed truncated oversized refused failed failures missing degraded '
-  + 'no silent overflow errors incomplete backwards jump step restart sequence compressed undelivered skipped implausible retries held').split(' '));
+  + 'no silent ahead behind rebased steps overflow errors incomplete backwards jump step restart sequence compressed undelivered skipped implausible retries held').split(' '));
 const MARKS = { ok: '●', degraded: '◐', silent: '✕', waiting: '○' };
 
 /** @param {SensorState} sensor @returns {[string, number][]} what was lost or went wrong, by reason */
 export const drops = (sensor) => Object.entries(sensor.counters ?? {})
   .filter(([name, count]) => isNumber(count) && count > 0 && name.split('_').some((word) => TROUBLE.has(word)));
+
+/** An offset (s) below this is not worth a word. */
+const CLOCK_SHOWN_S = 0.1;
+
+/** @param {SensorState} sensor @returns {string} how far its clock is off, unless its detail says so already */
+export const offClock = ({ clock_offset_s: offset, detail }) => (!isNumber(offset) || Math.abs(offset) < CLOCK_SHOWN_S
+  || /ahead|behind/.test(detail) ? '' : `clock ${offset > 0 ? '+' : '−'}${Math.abs(offset).toFixed(1)} s`);
 
 /** One row a sensor, with what it lost; a click on its name shows all its counters. */
 export class SensorPanel {
@@ -54,7 +61,7 @@ export class SensorPanel {
     setText(part('.sensor-state'), sensor.status);
     const age = isNumber(sensor.last) ? this.picture.time - sensor.last : NaN;
     setText(part('.sensor-age'), isNumber(age) ? (age < 1.5 ? 'now' : duration(age)) : '–');
-    const said = [sensor.detail, ...drops(sensor).map(([name, count]) => `${words(name)} ${compact(count)}`)].filter(Boolean).join(' · ');
+    const said = [sensor.detail, offClock(sensor), ...drops(sensor).map(([name, count]) => `${words(name)} ${compact(count)}`)].filter(Boolean).join(' · ');
     setText(part('.sensor-drops'), said);
     part('.sensor-drops').hidden = !said;
     const open = this.open.has(sensor.id);

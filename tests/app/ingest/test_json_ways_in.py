@@ -46,18 +46,16 @@ def test_one_event_and_many() -> None:
         (b'{"node": "A1"}', "bad_value", "time"),
         (b'{"time": 1700000000}', "bad_value", "node is missing"),
         (b'{"time": true, "node": "A1"}', "bad_value", "time"),
-        (b'{"time": 5, "node": "A1"}', "bad_value", "between the years"),
-        (b'{"time": 123456789012345678901234567890, "node": "A1"}', "bad_value", "between the years"),
+        (b'{"time": ' + b"9" * 400 + b', "node": "A1"}', "bad_value", "time must be"),
         (b'{"time": "2023-11-14T22:13:20", "node": "A1"}', "bad_value", "zone"),
         (b'{"time": "yesterday", "node": "A1"}', "bad_value", "yesterday"),
-        (b'{"time": "0001-01-01T00:00:00+23:59", "node": "A1"}', "bad_value", "event 0"),
         (b'{"time": 1700000000, "node": "C3"}', "unknown_node", "C3"),
         (b'{"time": 1700000000, "node": "A1", "speed_mps": -1}', "bad_value", "speed_mps"),
         (b'{"time": 1700000000, "node": "A1", "speed": 1}', "bad_value", "speed"),
         (b'{"time": 1700000000, "node": "A1", "kind": "flew"}', "bad_value", "flew"),
         (b"17", "bad_value", "object"),
         (b"[" * 100_000, "bad_json", "not JSON"),
-        (b'[{"time": 1700000000, "node": "A1"}, {"time": 1, "node": "A1"}]', "bad_value", "event 1"),
+        (b'[{"time": 1700000000, "node": "A1"}, {"time": "1", "node": "A1"}]', "bad_value", "event 1"),
     ],
 )
 def test_bad_events_are_refused_with_a_reason(body: bytes, reason: str, says: str) -> None:
@@ -65,6 +63,11 @@ def test_bad_events_are_refused_with_a_reason(body: bytes, reason: str, says: st
         parse_node_events(body, NODES)
     assert caught.value.reason == reason
     assert isinstance(caught.value, Refused)
+
+
+def test_a_time_that_cannot_be_is_left_to_the_judge_of_clocks() -> None:
+    body = b'[{"time": 5, "node": "A1"}, {"time": 1e13, "node": "A1"}, {"time": -3.5, "node": "A1"}]'
+    assert parse_node_events(body, NODES).time.tolist() == [5.0, 1e13, -3.5]
 
 
 def test_more_events_than_the_limit_are_refused() -> None:

@@ -73,8 +73,7 @@ ROW = 16 + 10
         (put(48 + ROW + 8, "<I", 2), "ascend"),
         (put(48 + ROW, "<d", float("nan")), "times"),
         (put(48 + ROW, "<d", float("inf")), "times"),
-        (put(48 + ROW, "<d", 5.0), "times"),
-        (put(48 + ROW, "<d", 1.7e9 - 1), "step back"),
+        (put(48 + ROW, "<d", -2e12), "times"),
     ],
 )
 def test_what_does_not_fit_is_refused(body: bytes, says: str) -> None:

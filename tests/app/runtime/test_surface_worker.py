@@ -1,4 +1,4 @@
-"""Commands to the surface thread are answered or refused with words, never left hanging."""
+"""Commands to the surface thread are answered or refused with words; what enters the engine, enters it in one order."""
 
 from __future__ import annotations
 
@@ -9,59 +9,107 @@ import pytest
 
 from app.contract import Refused
 from app.runtime.surface_worker import SurfaceWorker
-from pipeline.engine import SurfaceEngine
-from pipeline.picture import Picture
-from pipeline.tables import Tracks
+from pipeline.engine import Outcome, SurfaceEngine
+from pipeline.inputs import Acknowledge, Envelope, SensorHealth, SetRunway, Tick
+from pipeline.picture import AlertChange, Picture, SensorState
+from pipeline.tables import TargetReports, Tracks
+from tests.support.running import until
 
 
 class Engine:
-    """As much of an engine as the thread needs."""
+    """As much of an engine as the thread needs. hold: an acknowledgement waits for it."""
 
-    time = 0.0
-    sensors_degraded = False
+    def __init__(self) -> None:
+        self.taken: list[Any] = []
+        self.busy, self.go = threading.Event(), threading.Event()
 
-    def look(self) -> tuple[Picture, tuple[()]]:
-        return Picture(0.0, Tracks.empty()), ()
+    def step(self, envelope: Envelope) -> Outcome:
+        self.taken.append(envelope.body)
+        match envelope.body:
+            case SetRunway(runway="06/24"):
+                return Outcome(Picture(1.0, Tracks.empty()), answer="set")
+            case SetRunway():
+                return Outcome(refused=KeyError("runway"))
+            case Acknowledge():
+                self.busy.set()
+                assert self.go.wait(20)
+                return Outcome()
+            case TargetReports():
+                raise RuntimeError("broken")
+            case Tick():
+                return Outcome(Picture(1.0, Tracks.empty()), (cast(AlertChange, "a change"),))
+        return Outcome()
+
+    def save(self) -> dict[str, Any]:
+        return {}
+
+    def of(self, kind: type[Any]) -> list[Any]:
+        return [one for one in self.taken if isinstance(one, kind)]
 
 
-def worker(limit: int = 4) -> SurfaceWorker:
-    return SurfaceWorker(cast(SurfaceEngine, Engine()), lambda: (), limit)
+def worker(limit: int = 4, sensors: Any = tuple, **words: Any) -> tuple[SurfaceWorker, Engine]:
+    engine = Engine()
+    return SurfaceWorker(cast(SurfaceEngine, engine), sensors, limit, **words), engine
 
 
 def test_a_command_before_the_start_is_refused_at_once() -> None:
+    made, _ = worker()
     with pytest.raises(Refused, match="starting"):
-        worker().ask(lambda _: 1)
+        made.ask(SetRunway("06/24"))
 
 
 def test_a_command_is_answered_and_its_fault_raised() -> None:
-    made = worker()
+    made, _ = worker()
     made.start()
-
-    def fail(_: Any) -> None:
-        raise KeyError("runway")
-
-    assert made.ask(lambda _: 7) == 7
+    assert made.ask(SetRunway("06/24")) == "set"
     with pytest.raises(KeyError):
-        made.ask(fail)
+        made.ask(SetRunway("13/31"))
     made.stop()
 
 
 def test_a_command_that_gets_no_turn_is_taken_back() -> None:
-    made = worker()
+    made, engine = worker()
     made.start()
-    busy, go = threading.Event(), threading.Event()
-    done: list[int] = []
-
-    def hold(_: Any) -> None:
-        busy.set()
-        go.wait(20)
-
-    holding = threading.Thread(target=lambda: made.ask(hold, 20))
+    holding = threading.Thread(target=lambda: made.ask(Acknowledge(1, "tower"), 20))
     holding.start()
-    assert busy.wait(10)
+    assert engine.busy.wait(10)
     with pytest.raises(Refused, match="nothing was done"):
-        made.ask(lambda _: done.append(1), timeout=0.05)
-    go.set()
+        made.ask(SetRunway("06/24"), timeout=0.05)
+    engine.go.set()
     holding.join(20)
     made.stop()
-    assert done == []
+    assert not engine.of(SetRunway)
+
+
+def test_an_input_that_the_engine_cannot_take_is_counted_and_the_thread_goes_on() -> None:
+    made, engine = worker()
+    made.start()
+    made.offer(TargetReports.empty())
+    until(lambda: made.failures == 1, "the failure is counted")
+    ticks = len(engine.of(Tick))
+    until(lambda: len(engine.of(Tick)) > ticks, "time goes on")
+    made.stop()
+
+
+def test_no_alert_change_is_lost_where_only_the_newest_picture_is_sent() -> None:
+    made, engine = worker()
+    heard: list[Any] = []
+    made.listen(lambda _picture, changes: heard.extend(changes))
+    made.start()
+    until(lambda: len(engine.of(Tick)) >= 3, "three ticks passed")
+    made.stop()
+    assert len(heard) == len(engine.of(Tick))
+
+
+def test_the_engine_hears_when_the_health_of_a_radar_changes_and_only_then() -> None:
+    status = ["ok"]
+    made, engine = worker(sensors=lambda: (SensorState("smr-1", "radar", status[0], None),))
+    made.start()
+    until(lambda: len(engine.of(Tick)) >= 2, "ticks pass")
+    assert engine.of(SensorHealth) == []
+    status[0] = "silent"
+    until(lambda: engine.of(SensorHealth) == [SensorHealth(("smr-1",))], "the engine knows")
+    status[0] = "ok"
+    until(lambda: len(engine.of(SensorHealth)) == 2, "the engine knows that it is well again")
+    made.stop()
+    assert engine.of(SensorHealth)[1] == SensorHealth(())

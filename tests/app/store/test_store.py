@@ -205,6 +205,18 @@ def test_old_rows_are_deleted(url: str) -> None:
         assert store.alert_changes(alert.id) == []
 
 
+@pytest.mark.parametrize("wrong", [time.time() + 3600.0 * 24 * 2, 4_080_000_000.0])
+def test_a_time_beyond_the_hosts_deletes_nothing(sqlite_url: str, wrong: float) -> None:
+    with opened(sqlite_url, storage=StorageSettings(retention_days=1.0)) as store:
+        now = time.time()
+        store.record(Picture(now, tracks_at(now, [50])), ())
+        store.record(Picture(wrong, tracks_at(wrong, [51])), ())
+        until(lambda: store.writer_counters()["points"] >= 2, "both are written")
+        assert store._retention.newest >= wrong
+        store._retention.run(store.engine, force=True)
+        assert {one["id"] for one in store.tracks(None, None)} == {50, 51}
+
+
 def test_the_history_of_a_track_is_one_contiguous_read(sqlite_url: str) -> None:
     with opened(sqlite_url) as store, store.engine.connect() as connection:
         for query, index in (

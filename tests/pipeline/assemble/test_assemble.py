@@ -1,5 +1,6 @@
 """The assembler: loss, repeats, disorder, midnight and restarts are counted and never make a wrong picture."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
@@ -290,7 +291,7 @@ def test_a_sweep_of_half_a_turn_is_not_believed() -> None:
 
 
 @pytest.mark.parametrize(("step", "reason"), [(-5.0, "time_backwards"), (600.0, "time_jump")])
-def test_a_time_that_steps_once_is_dropped_and_counted(step: float, reason: str) -> None:
+def test_a_time_that_steps_once_is_counted_on_by_the_rotation(step: float, reason: str) -> None:
     messages = stream(2)
     wrong = messages[50].time_of_day or 0
     messages[50] = replace(messages[50], time_of_day=round(wrong + step * 128))
@@ -298,18 +299,54 @@ def test_a_time_that_steps_once_is_dropped_and_counted(step: float, reason: str)
     assert faults(counters) == {reason: 1}
     times = np.concatenate([b.time for b in blocks])
     assert bool(np.all(np.diff(times) >= 0))
-    assert len(times) == 2 * AZIMUTHS - 1
+    assert np.allclose(times, T0 + np.arange(2 * AZIMUTHS) / AZIMUTHS, atol=2 / 128)
 
 
-@pytest.mark.parametrize(("step", "reason"), [(-5.0, "time_backwards"), (600.0, "time_jump")])
-def test_a_clock_that_was_set_is_followed_in_a_new_scan(step: float, reason: str) -> None:
+@pytest.mark.parametrize(("step", "reason"), [(-5.0, "time_backwards"), (600.0, "time_jump"), (-1.0, "time_backwards")])
+def test_a_clock_that_was_set_is_followed_without_loss(step: float, reason: str) -> None:
     messages = stream(2) + stream(3, t0=T0 + 2 + step, first=228)
     blocks, counters = assembled(messages)
     assert faults(counters) == {reason: 31, "clock_step": 1}
-    for block in blocks:
-        assert bool(np.all(np.diff(block.time) >= 0))
-    assert bool(np.all(np.diff(rows(blocks)[:, 0]) > 0))
+    assert rows(blocks)[:, 0].tolist() == list(range(5 * AZIMUTHS))
     assert blocks[-1].time[-1] == pytest.approx(T0 + 5 + step, abs=0.05)
+    times = np.concatenate([b.time for b in blocks])
+    assert int(np.count_nonzero(np.abs(np.diff(times)) > 0.5)) == 1, "one step, where it is believed"
+
+
+def leap(shown: str) -> list[VideoMessage]:
+    """Four turns of a second over a leap second at the end of their second, as radars show it."""
+    midnight = 20_001 * DAY
+    messages = stream(4, t0=midnight - 2)
+    table: dict[str, Callable[[float], float]] = {
+        "23:59:60": lambda t: t if t < 2 else t - 2 + DAY if t < 3 else t - 3,
+        "23:59:59 twice": lambda t: t if t < 2 else t - 3 + DAY if t < 3 else t - 3,
+        "0:00:00 twice": lambda t: t if t < 2 else t - 2 if t < 3 else t - 3,
+    }
+    counts = table[shown]
+    made = []
+    for i, one in enumerate(messages):
+        t = i / AZIMUTHS
+        seconds = DAY - 2 + t if t < 2 else counts(t)
+        made.append(replace(one, time_of_day=round(seconds * 128) if seconds < DAY + 1 else None))
+    return made
+
+
+@pytest.mark.parametrize("shown", ["23:59:60", "23:59:59 twice", "0:00:00 twice"])
+def test_a_leap_second_loses_nothing(shown: str) -> None:
+    messages = leap(shown)
+    blocks, counters = assembled(messages, arrivals(messages, 20_001 * DAY - 2))
+    assert rows(blocks)[:, 0].tolist() == list(range(4 * AZIMUTHS))
+    assert faults(counters) == {"time_backwards": 31, "clock_step": 1}
+    times = np.concatenate([b.time for b in blocks])
+    assert times[-1] == pytest.approx(20_001 * DAY + 1, abs=0.05)
+
+
+def test_a_block_says_when_its_newest_sweep_arrived() -> None:
+    messages = stream(2)
+    arrival = arrivals(messages)
+    blocks, _ = assembled(messages, arrival, cuts=[13, 50, 99])
+    height = AZIMUTHS // BLOCKS
+    assert [b.arrival for b in blocks] == arrival[height - 1 :: height].tolist()
 
 
 def test_a_radar_without_time_gets_that_of_arrival() -> None:

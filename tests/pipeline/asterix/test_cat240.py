@@ -108,7 +108,7 @@ def test_an_independent_codec_reads_what_is_encoded(ranges: int) -> None:
     bits=st.sampled_from([1, 2, 4, 8, 16, 32]), count=st.integers(1, 600), seed=st.integers(0, 9999),
     message=st.integers(0, 2**32 - 1), start=st.integers(0, 65535), end=st.integers(0, 65535), nano=st.booleans(),
     duration=st.integers(1, 2**32 - 1), first=st.integers(0, 2**32 - 1),
-    time=st.none() | st.integers(0, 86400 * 128 - 1), sac=st.integers(0, 255), sic=st.integers(0, 255),
+    time=st.none() | st.integers(0, 86401 * 128 - 1), sac=st.integers(0, 255), sic=st.integers(0, 255),
 )  # fmt: skip
 def test_any_message_comes_back(
     bits: int, count: int, seed: int, message: int, start: int, end: int, nano: bool, duration: int, first: int,

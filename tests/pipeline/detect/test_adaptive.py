@@ -17,8 +17,8 @@ from pipeline.detect.adaptive import Adaptive
 from pipeline.kernels.tiles import learn_tiles, tile_bits, tile_bits_lowered, tile_limits
 from pipeline.parts import build
 from pipeline.tables import Sweeps, VideoFormat
+from tests.pipeline.contracts.detect import DetectorContract
 from tests.pipeline.detect import naive_adaptive
-from tests.pipeline.contracts.front_end import DetectorContract
 
 VIDEO = VideoFormat(azimuths=256, ranges=256, range_step_m=3.0, beamwidth_rad=0.03)
 

@@ -12,11 +12,12 @@ from scipy.stats import binom
 from pipeline.contracts.detect import Detector
 from pipeline.detect.ca import CellAveraging
 from pipeline.detect.calibration import mean_offsets_db, power_mean_offsets_db
+from pipeline.detect.window import window_of
 from pipeline.parts import PartError, build
 from pipeline.tables import VideoFormat
-from tests.pipeline.contracts.front_end import DetectorContract, busy_video
+from tests.pipeline.contracts.detect import DetectorContract
 from tests.pipeline.detect.naive_detect import cell_averaging_limit, window_cells
-from tests.support.video_scenes import false_alarm_share, rayleigh, strip
+from tests.support.video_scenes import busy_video, false_alarm_share, rayleigh, strip
 
 
 class TestCellAveragingKeepsTheContract(DetectorContract):
@@ -47,7 +48,7 @@ def test_equal_to_the_obvious_twin(domain: Any, sweeps: int, guard_sweeps: int, 
         limits[block.scan, kept] = part.thresholds(block, state)
         part(block, state)
     share = video.azimuth_step_rad / video.beamwidth_rad
-    for scan, row, j, inside in window_cells(part.window, frames, keep):
+    for scan, row, j, inside in window_cells(window_of(part), frames, keep):
         rows = 1 + sum(
             back <= scan * 17 + row and bool(keep.ravel()[scan * 17 + row - back]) for back in range(1, sweeps + 1)
         )

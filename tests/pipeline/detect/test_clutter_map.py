@@ -14,9 +14,9 @@ from pipeline.detect.clutter_map import ClutterMap
 from pipeline.parts import PartError, build
 from pipeline.state import StateError
 from pipeline.tables import VideoFormat
-from tests.pipeline.contracts.front_end import DetectorContract, busy_video
+from tests.pipeline.contracts.detect import DetectorContract
 from tests.pipeline.detect.naive_detect import clutter_map_limits
-from tests.support.video_scenes import SMALL, false_alarm_share, rayleigh, strip
+from tests.support.video_scenes import SMALL, busy_video, false_alarm_share, rayleigh, strip
 
 MODES = ("none", "limit", "freeze", "both")
 

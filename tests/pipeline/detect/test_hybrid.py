@@ -15,9 +15,9 @@ from pipeline.detect.macro_cells import FEWEST, MacroCells, MapCells, map_labels
 from pipeline.parts import PartError, build
 from pipeline.state import StateError
 from pipeline.tables import VideoFormat
-from tests.pipeline.contracts.front_end import DetectorContract, busy_video, mask_of
+from tests.pipeline.contracts.detect import DetectorContract, mask_of
 from tests.support.naive_front_end import hybrid_masks, square_labels
-from tests.support.video_scenes import SMALL, cut, rayleigh, strip
+from tests.support.video_scenes import SMALL, busy_video, cut, rayleigh, strip
 
 
 class TestHybridKeepsTheContract(DetectorContract):

@@ -12,11 +12,12 @@ from scipy.stats import binom
 from pipeline.contracts.detect import Detector
 from pipeline.detect.calibration import order_offset_steps
 from pipeline.detect.os import GOLDEN, OrderedStatistic
+from pipeline.detect.window import window_of
 from pipeline.parts import PartError, build
 from pipeline.tables import VideoFormat
-from tests.pipeline.contracts.front_end import DetectorContract, busy_video
+from tests.pipeline.contracts.detect import DetectorContract
 from tests.pipeline.detect.naive_detect import window_cells
-from tests.support.video_scenes import false_alarm_share, rayleigh, strip
+from tests.support.video_scenes import busy_video, false_alarm_share, rayleigh, strip
 
 
 class TestOrderedStatisticKeepsTheContract(DetectorContract):
@@ -44,7 +45,7 @@ def test_equal_to_the_obvious_twin(rank: float, sweeps: int, guard_sweeps: int, 
     for block, kept in zip(strip(frames, video, keep), keep, strict=True):
         limits[block.scan, kept] = part.thresholds(block, state)
         part(block, state)
-    for scan, row, j, inside in window_cells(part.window, frames, keep):
+    for scan, row, j, inside in window_cells(window_of(part), frames, keep):
         n = len(inside)
         k = max(round(rank * n), 1)
         above = np.floor(order_offset_steps(1e-2, video.db_per_step, float(n), float(k)) + j * GOLDEN % 1)

@@ -9,7 +9,7 @@ from pipeline.extract.manhattan import Manhattan
 from pipeline.kernels.links import LinkRule
 from pipeline.kernels.plot_shape import EDGE, GLINT, LOST, PLACED
 from pipeline.tables import Plots, VideoFormat
-from tests.pipeline.contracts.front_end import plots_of
+from tests.pipeline.contracts.extract import plots_of
 from tests.pipeline.extract.naive_components import linked_components
 from tests.support.video_scenes import site, strip
 

@@ -15,9 +15,9 @@ from pipeline.extract.hysteresis import Hysteresis
 from pipeline.kernels.growth import GrowthState
 from pipeline.parts import PartError, build
 from pipeline.tables import Detections, Plots, Sweeps, VideoFormat
-from tests.pipeline.contracts.front_end import CUTS, INHERITED, ExtractorContract, assert_same_plots, clumps
+from tests.pipeline.contracts.extract import ExtractorContract, assert_same_plots, clumps
 from tests.pipeline.extract.naive_hysteresis import hysteresis_components, kept_cells
-from tests.support.video_scenes import SMALL, cut, packed, rayleigh, site, strip
+from tests.support.video_scenes import CUTS, INHERITED, SMALL, cut, packed, rayleigh, site, strip
 
 
 class TestHysteresisKeepsTheContract(ExtractorContract):

@@ -15,7 +15,7 @@ from pipeline.extract.manhattan import Manhattan
 from pipeline.parts import PartError, build
 from pipeline.state import StateError
 from pipeline.tables import Plots, VideoFormat
-from tests.pipeline.contracts.front_end import ExtractorContract, plots_of
+from tests.pipeline.contracts.extract import ExtractorContract, plots_of
 from tests.support.naive_front_end import m_graph_components
 from tests.support.video_scenes import SMALL, packed, site, strip
 

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from pipeline.kernels.growth import GrowthState, GrowthWindow, flush_grown, take_grown_block
 from pipeline.kernels.links import LinkRule
 from pipeline.tables import Plots, Sweeps, VideoFormat
-from tests.pipeline.contracts.front_end import CUTS, assert_same_plots
+from tests.pipeline.contracts.extract import assert_same_plots
 from tests.pipeline.extract.naive_components import grown_cells, linked_components
-from tests.support.video_scenes import cut, packed, site, strip
+from tests.support.video_scenes import CUTS, cut, packed, site, strip
 
 GRID = VideoFormat(azimuths=48, ranges=200, range_step_m=3.0, beamwidth_rad=0.2)
 

@@ -1,0 +1,37 @@
+"""The settings as they may be handed on with a recording: without passwords."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from app.settings import Settings
+
+MASK = "***"
+_USER_INFO = re.compile(r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*://)[^/?#\s]*@")
+_SECRET_QUERY = re.compile(r"(?i)(?P<key>[?&][^=&#\s]*(?:password|passwd|secret|token|key|auth)[^=&#\s]*=)[^&#\s]*")
+_SECRET_NAME = re.compile(r"(?i)password|passwd|secret|token|credential")
+
+
+def masked(settings: Settings) -> dict[str, Any]:
+    """All settings as plain JSON values; user, password and secret parameters of every URL are replaced by "***".
+
+    A setting whose own name speaks of a secret (password, token, ...) is replaced as a whole.
+    """
+    plain: dict[str, Any] = settings.model_dump(mode="json")
+    return {key: _masked(key, value) for key, value in plain.items()}
+
+
+def masked_text(text: str) -> str:
+    """A text in which the user info and the secret parameters of every URL are replaced by "***"."""
+    return _SECRET_QUERY.sub(rf"\g<key>{MASK}", _USER_INFO.sub(rf"\g<scheme>{MASK}@", text))
+
+
+def _masked(key: str, value: Any) -> Any:
+    if isinstance(value, dict):
+        return {inner: _masked(inner, one) for inner, one in value.items()}
+    if isinstance(value, list):
+        return [_masked(key, one) for one in value]
+    if isinstance(value, str):
+        return MASK if value and _SECRET_NAME.search(key) else masked_text(value)
+    return value

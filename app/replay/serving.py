@@ -1,0 +1,92 @@
+"""Serves the displays with the picture of a journal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+from app.api.application import create_app
+from app.journal.names import JournalError
+from app.journal.reader import Journal
+from app.live.hub import Hub
+from app.replay.player import JournalPlayer
+from app.replay.recorded import RecordedRun, changed, recorded_run
+from app.replay.service import ReplayService
+from app.run import serve
+from pipeline.engine_records import SWEEPS
+
+if TYPE_CHECKING:
+    from app.view3d import View3D
+
+
+class ReplayRunning:
+    """The replaying service with its feed, displays and server; see `app.run.Running`."""
+
+    def __init__(
+        self,
+        journal: Journal,
+        orders: Sequence[str],
+        window: tuple[float | None, float | None],
+        port: int,
+        speed: float,
+    ) -> None:
+        sweeps = SWEEPS in journal.topics()
+
+        def change(run: RecordedRun) -> RecordedRun:
+            return changed(run, orders, sweeps=sweeps)
+
+        attached = next((got for one in journal.files if (got := one.attachments())), None)
+        if attached is None:
+            raise JournalError(f"{journal.name}: no settings and no map in it")
+        run = change(recorded_run(attached, journal.name))
+        self.settings = run.settings.model_copy(update={"port": port, "host": "127.0.0.1", "mode": "replay"})
+        player = JournalPlayer(journal, change, window, speed)
+        self.service = ReplayService(
+            RecordedRun(run.document, self.settings, run.airport, run.geojson, run.versions), player
+        )
+        self.hub = Hub(self.service, self.settings)
+        player.begin_anew = self.hub.begin_anew
+        self.view3d: View3D | None = None
+        router = None
+        if self.settings.view3d:
+            from app.view3d import View3D
+            from app.view3d import router as view_router
+
+            self.view3d = View3D(run.airport, "replay")
+            router = view_router(self.view3d, self.settings)
+        self.app = create_app(self.service, hub=self.hub, store=None, view3d_router=router)
+        self._ends = ExitStack()
+
+    def begin(self, step: Callable[[str], None]) -> None:
+        """Start the replay; `step` hears what is being done."""
+        service = self.service
+        service.listen(self.hub.publish)
+        if self.view3d is not None:
+            step("3D view: building the scene")
+            self.view3d.start()
+            self._ends.callback(self.view3d.stop)
+            view = self.view3d
+            service.listen(lambda picture, _changes: view.update(picture))
+        step("journal: finding the first picture")
+        service.player.start()
+        self._ends.callback(service.player.stop)
+
+    def end(self) -> None:
+        """Stop everything in the opposite order."""
+        self._ends.close()
+
+
+def serve_journal(
+    console: Console,
+    journal: Journal,
+    orders: Sequence[str],
+    window: tuple[float | None, float | None],
+    port: int,
+    speed: float,
+) -> int:
+    """Serve until interrupted; the exit status. Raises JournalError, SettingsError."""
+    running = ReplayRunning(journal, orders, window, port, speed)
+    return serve(running.settings, console, running)

@@ -1,0 +1,241 @@
+"""Runs the engine on a journal's inputs again and compares every bit of what came out with what was recorded."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+
+from app.journal.names import GAP, SNAPSHOT, JournalError
+from app.journal.reader import Journal, Record
+from app.replay.recorded import RecordedRun, recorded_run
+from app.replay.video import VideoReplay
+from pipeline.engine import SurfaceEngine
+from pipeline.engine_records import CODEC, INPUT, OUTPUT, Shown, shown
+from pipeline.inputs import Envelope
+from pipeline.tables import SectorPlots, Tracks
+from pipeline.values import first_difference
+
+log = logging.getLogger(__name__)
+
+SEQUENCE_MODULO = 2**32
+
+
+@dataclass(frozen=True, slots=True)
+class Replayed:
+    """One input run again. recorded: what the live engine made of it, made: what this one does; None for nothing.
+
+    complete: the record of what the live engine made is there (the last input of a file that was cut off has none).
+    """
+
+    record: Record
+    envelope: Envelope
+    recorded: Shown | None
+    made: Shown | None
+    recorded_octets: bytes | None
+    complete: bool = True
+
+
+@dataclass
+class Verification:
+    """What was compared. difference: the first place where bits differ, in words; None: identical."""
+
+    inputs: int = 0
+    pictures: int = 0
+    changes: int = 0
+    snapshots: int = 0
+    sectors: int = 0
+    runs: int = 0
+    gaps: int = 0
+    failures: int = 0
+    difference: str | None = None
+    first: float | None = None
+    last: float | None = None
+    versions: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def columns(self) -> int:
+        """Columns of tracks compared."""
+        return self.pictures * len(Tracks.columns())
+
+
+class ReplayEngine:
+    """The engine of a journal, fed record by record, and the chains of its radars where raw sweeps were recorded.
+
+    change: gives the run that is to be replayed for a recorded one. own: verbs of the radars' chains that take their
+    parts from the settings; the engine is then given the plots of these chains in place of the recorded ones.
+    """
+
+    def __init__(
+        self,
+        journal: Journal,
+        change: Callable[[RecordedRun], RecordedRun] = lambda run: run,
+        own: frozenset[str] = frozenset(),
+    ) -> None:
+        self.journal = journal
+        self.video: VideoReplay | None = None
+        self._own = own
+        self.engine: SurfaceEngine | None = None
+        self.run: RecordedRun | None = None
+        self.counts = Verification()
+        self._change = change
+        self._id = ""
+        self._sequence: int | None = None
+        self.detection_difference: str | None = None
+        """Where the plots of a chain were not those recorded."""
+        self._lost = True
+        """No state to go on from: at the begin, and after a gap, up to the next snapshot."""
+
+    def replayed(self, since: float | None = None, until: float | None = None) -> Iterator[Replayed | Record]:
+        """Every input with both outcomes, and every other record as it stands, in order. Raises JournalError."""
+        waiting: tuple[Record, Envelope, Shown | None] | None = None
+        for record in self.journal.records(since):
+            if until is not None and record.time > until:
+                break
+            self._follow(record)
+            if record.topic == OUTPUT and waiting is not None and not self._lost:
+                recorded = CODEC.decode(record.data)
+                yield Replayed(waiting[0], waiting[1], recorded, waiting[2], record.data)
+                waiting = None
+                continue
+            if waiting is not None and (self._lost or record.topic in (INPUT, SNAPSHOT)):
+                # after records that are missing nobody knows what came of the last input
+                yield Replayed(waiting[0], waiting[1], None, waiting[2], None, complete=not self._lost)
+                waiting = None
+            if record.topic == INPUT and not self._lost:
+                waiting = self._step(record)
+            elif record.topic not in (INPUT, OUTPUT):
+                if self.video is not None:
+                    self.video.take(record)
+                yield record
+        if waiting is not None:
+            yield Replayed(waiting[0], waiting[1], None, waiting[2], None, complete=False)
+
+    def restore(self, snapshot: Record) -> None:
+        """Go on from a snapshot. Raises JournalError when it does not fit the engine."""
+        assert self.engine is not None
+        try:
+            self.engine.restore(CODEC.decode(snapshot.data))
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise JournalError(f"{self.journal.name}: the snapshot at {told(snapshot.time)}: {error}") from error
+        self._lost = False
+
+    @property
+    def lost(self) -> bool:
+        """There is no state to go on from before the next snapshot."""
+        return self._lost
+
+    def _follow(self, record: Record) -> None:
+        if record.run != self._id:
+            self._begin_run(record.run)
+        elif self._sequence is not None and record.sequence != (self._sequence + 1) % SEQUENCE_MODULO:
+            self._lose()
+        self._sequence = record.sequence
+        if record.topic == GAP:
+            self._lose()
+
+    def _detected_again(self, record: Record, envelope: Envelope, recorded: SectorPlots) -> Envelope:
+        """The sector as the chain makes it of the recorded sweeps, where these are there."""
+        made = self.video.sector(recorded) if self.video is not None else None
+        if made is None:
+            return envelope
+        self.counts.sectors += 1
+        if self._own:
+            return replace(envelope, body=made)
+        if CODEC.encode(made) != CODEC.encode(recorded):
+            self.detection_difference = f"plots at {told(record.time)}: {first_difference(recorded, made)}"
+        return envelope
+
+    def _lose(self) -> None:
+        if not self._lost:
+            self.counts.gaps += 1
+        self._lost = True
+
+    def _begin_run(self, id: str) -> None:
+        self._id, self._lost, self._sequence = id, True, None
+        attached = next((got for one in self.journal.files if (got := one.attachments(id))), {})
+        self.run = self._change(recorded_run(attached, self.journal.name))
+        self.engine = self.run.engine()
+        self.video = VideoReplay(self.run, self._own)
+        self.counts.runs += 1
+        self.counts.versions = self.run.versions
+
+    def _step(self, record: Record) -> tuple[Record, Envelope, Shown | None]:
+        assert self.engine is not None
+        try:
+            envelope = CODEC.decode(record.data)
+        except ValueError as error:
+            raise JournalError(f"{self.journal.name}: the input at {told(record.time)}: {error}") from error
+        self.counts.inputs += 1
+        if isinstance(envelope.body, SectorPlots):
+            envelope = self._detected_again(record, envelope, envelope.body)
+        try:
+            made = shown(self.engine.step(envelope))
+        except Exception:
+            # the live engine failed at the same place, and went on
+            self.counts.failures += 1
+            log.debug("the engine could not take the input at %s", told(record.time), exc_info=True)
+            made = None
+        return record, envelope, made
+
+
+def verify(
+    journal: Journal,
+    since: float | None = None,
+    until: float | None = None,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Verification:
+    """Run a journal again and stop at the first difference. progress: hears the time reached, UTC s.
+
+    Raises JournalError when the journal cannot be read.
+    """
+    replay = ReplayEngine(journal)
+    counts = replay.counts
+    for one in replay.replayed(since, until):
+        if isinstance(one, Record):
+            if one.topic == SNAPSHOT:
+                counts.difference = _at_snapshot(replay, one)
+        else:
+            counts.difference = replay.detection_difference or _compared(one, counts)
+            counts.first = one.record.time if counts.first is None else counts.first
+            counts.last = one.record.time
+            progress(one.record.time)
+        if counts.difference is not None:
+            break
+    return counts
+
+
+def told(time: float) -> str:
+    """A moment for a person: UTC with milliseconds."""
+    return datetime.fromtimestamp(time, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def _compared(one: Replayed, counts: Verification) -> str | None:
+    if not one.complete:
+        return None
+    made = None if one.made is None else CODEC.encode(one.made)
+    if made == one.recorded_octets:
+        if one.made is not None:
+            counts.pictures += one.made.time == one.made.time
+            counts.changes += len(one.made.changes)
+        return None
+    place = f"input {one.record.sequence} ({type(one.envelope.body).__name__}) at {told(one.record.time)}"
+    if one.recorded is None or one.made is None:
+        which = "recorded" if one.made is None else "replayed"
+        return f"{place}: only the {which} engine made a picture of it"
+    return f"{place}: {first_difference(one.recorded, one.made) or 'the octets differ, the values do not'}"
+
+
+def _at_snapshot(replay: ReplayEngine, snapshot: Record) -> str | None:
+    """Restore from the snapshot where there is nothing to go on from; elsewhere it must be the state reached."""
+    replay.counts.snapshots += 1
+    if replay.lost:
+        replay.restore(snapshot)
+        return None
+    assert replay.engine is not None
+    reached = replay.engine.save()
+    if CODEC.encode(reached) == snapshot.data:
+        return None
+    found = first_difference(CODEC.decode(snapshot.data), reached) or "the octets differ, the values do not"
+    return f"snapshot {snapshot.sequence} at {told(snapshot.time)}: {found}"

@@ -1,0 +1,229 @@
+"""Wrong clocks at the real service: one report or event of another time, a radar whose clock steps, a leap second."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+
+from app.api.application import create_app
+from app.ingest.octets import encode_sweeps
+from app.live.hub import Hub
+from app.runtime.host_clock import HostClock
+from app.service import SurfaceService
+from app.settings import NodeSettings, PartSettings, PartsSettings, RadarSettings, Settings, UdpSettings
+from pipeline.asterix.cat240 import encode_sweeps as encode_datagrams
+from pipeline.picture import SensorState
+from tests.app.runtime.small_radar import AZIMUTHS, RANGES, T0, VIDEO, small_site, turn
+from tests.support.running import until
+from tests.support.small_airport import as_geojson, small_airport
+
+YEAR_2099 = 4_085_000_000.0
+LIGHT = 299_792_458.0
+
+
+def radar_settings(**values: Any) -> RadarSettings:
+    return RadarSettings(
+        **{
+            "id": "smr-1", "latitude": 48.72, "longitude": 2.38, "azimuths": AZIMUTHS, "ranges": RANGES,
+            "range_step_m": VIDEO.range_step_m, "blocks_per_scan": 8, "udp": None, **values,
+        }
+    )  # fmt: skip
+
+
+class Running:
+    """A service, and the web application before it."""
+
+    def __init__(self, folder: Path, *radars: RadarSettings, clock: HostClock | None = None) -> None:
+        parts = PartsSettings(detect=PartSettings(name="hybrid"))
+        node = NodeSettings(id="N1", latitude=48.7233, longitude=2.3794)
+        settings = Settings(data_dir=folder, view3d=False, radars=radars, nodes=(node,), parts=parts)
+        airport = small_airport()
+        self.service = SurfaceService(settings, airport, as_geojson(airport), clock)
+        self.stored: list[float] = []
+        self.service.keep_node_events = lambda events: self.stored.extend(events.time.tolist())
+        self.service.prepare()
+        self.service.start()
+
+    def ask(self, method: str, path: str, **words: Any) -> httpx.Response:
+        app = create_app(self.service, hub=Hub(self.service, self.service.settings), store=None)
+
+        async def ask() -> httpx.Response:
+            async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://here") as client:
+                return await client.request(method, "/api/v1" + path, **words)
+
+        return asyncio.run(ask())
+
+    def sensor(self, id: str) -> SensorState:
+        return next(one for one in self.service.sensors() if one.id == id)
+
+    def time(self) -> float:
+        picture = self.service.picture()
+        return picture.time if picture is not None else 0.0
+
+
+@pytest.fixture(params=["with a radar", "without"])
+def running(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Running]:
+    made = Running(tmp_path, *([radar_settings()] if request.param == "with a radar" else []))
+    if made.service.radars:
+        now = time.time()
+        for block in turn(0):
+            sent = replace(block, time=block.time - T0 + now - 1.0)
+            made.service.submit_sweeps("smr-1", encode_sweeps(sent, small_site()))
+        until(lambda: made.sensor("smr-1").counters["sweeps"] == AZIMUTHS, "the turn is worked on")
+    yield made
+    made.service.stop()
+
+
+PLACE = {"reports": ("/targets/reports", {"lat": 48.7233, "lon": 2.3794, "address": "39abcd"}),
+         "nodes": ("/nodes/events", {"node": "N1", "speed_mps": 8.0})}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["reports", "nodes"])
+@pytest.mark.parametrize(
+    ("wrong", "reason", "words"),
+    [
+        (lambda now: now + 3600.0, "ahead", "3,600 s ahead of this host: local time?"),
+        (lambda now: YEAR_2099, "ahead", "years ahead of this host"),
+        (lambda now: now + 18.0, "ahead", "18 s ahead of this host: GPS time?"),
+        (lambda now: 4711.0, "behind", "counts from its own start?"),
+    ],
+    ids=["+1 h", "2099", "+18 s", "uptime"],
+)
+def test_one_datum_of_another_time_is_refused_and_changes_nothing_else(
+    running: Running, kind: str, wrong: Callable[[float], float], reason: str, words: str
+) -> None:
+    path, row = PLACE[kind]
+    now = time.time()
+    answer = running.ask("POST", path, json={**row, "time": wrong(now)})
+    assert answer.status_code == 422, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert words in answer.json()["detail"]
+    state = running.sensor(kind)
+    assert state.status == "degraded"
+    assert f"1 {'report' if kind == 'reports' else 'event'} {reason} " in state.detail
+    assert "refused" in state.detail
+    assert state.counters[f"refused_{reason}"] == 1
+    assert state.clock_offset_s == pytest.approx(wrong(now) - now, abs=5.0)
+    assert all(one.status != "degraded" for one in running.service.sensors() if one.id != kind)
+
+    answer = running.ask("POST", path, json=[{**row, "time": time.time()}, {**row, "time": wrong(now)}])
+    assert (answer.status_code, answer.json()) == (200, {"taken": 1, f"refused_{reason}": 1})
+    good = time.time()
+    assert running.ask("POST", path, json={**row, "time": good}).json() == {"taken": 1}
+    until(lambda: running.time() >= good - 0.001, "the good one is in the picture")
+    assert running.time() <= time.time() + 0.2
+    assert running.sensor(kind).counters["taken"] == 2
+    picture = running.service.picture()
+    assert picture is not None
+    assert len(picture.tracks) >= (1 if kind == "reports" else 0)
+    assert all(abs(one - now) < 60 for one in running.stored)
+    assert len(running.stored) == (2 if kind == "nodes" else 0)
+    metrics = running.service.sensors()
+    assert any(one.id == kind and one.clock_offset_s is not None and abs(one.clock_offset_s) < 1.0 for one in metrics)
+
+
+def test_a_clock_0_7_s_ahead_is_corrected_and_shown(running: Running) -> None:
+    path, row = PLACE["reports"]
+    for _ in range(3):
+        assert running.ask("POST", path, json={**row, "time": time.time() + 0.7}).json() == {"taken": 1}
+    state = running.sensor("reports")
+    assert state.status == "ok"
+    assert state.clock_offset_s == pytest.approx(0.7, abs=0.3)
+    assert state.last is not None
+    assert state.last <= time.time()
+
+
+class Turning(Running):
+    """With a radar that is posted to, and a host whose clock goes with its turns."""
+
+    def __init__(self, folder: Path) -> None:
+        self.now = T0
+        super().__init__(folder, radar_settings(), clock=HostClock(lambda: self.now, lambda: self.now))
+        self.scan = 0
+
+    def turns(self, many: int, wrong: float = 0.0) -> None:
+        for _ in range(many):
+            for block in turn(self.scan):
+                self.now = float(block.time[-1])
+                sent = replace(block, time=block.time + wrong)
+                self.service.submit_sweeps("smr-1", encode_sweeps(sent, small_site()))
+            self.scan += 1
+            done = self.scan * AZIMUTHS
+            until(lambda done=done: self.sensor("smr-1").counters["sweeps"] == done, "the turn is worked on")
+
+
+@pytest.mark.parametrize("step", [3600.0, -3600.0, -T0], ids=["+1 h", "-1 h", "1970"])
+def test_a_radar_whose_clock_steps_goes_on_and_says_so(tmp_path: Path, step: float) -> None:
+    running = Turning(tmp_path)
+    try:
+        running.turns(5)
+        assert running.sensor("smr-1").status == "ok"
+        for wrong in (step, 0.0):
+            running.turns(2, wrong)
+            state = running.sensor("smr-1")
+            assert state.last == pytest.approx(running.now, abs=0.05)
+            assert state.status == "degraded"
+            assert f"clock stepped {'+' if (step > 0) == (wrong == step) else '-'}" in state.detail
+            assert state.clock_offset_s == pytest.approx(wrong, abs=0.05)
+            until(lambda: running.time() > running.now - 0.2, "the picture goes on")
+            running.turns(6, wrong)
+            assert running.sensor("smr-1").counters["block_failures"] == 0
+        running.turns(25)
+        assert (running.sensor("smr-1").status, running.sensor("smr-1").detail) == ("ok", "")
+        assert running.sensor("smr-1").counters["time_rebased"] == 2
+        surface = running.service._surface
+        assert surface is not None
+        assert surface.engine.tracker.counters.get("sector_late", 0) == 0
+    finally:
+        running.service.stop()
+
+
+def test_a_leap_second_at_midnight_loses_no_sweep_over_udp(tmp_path: Path) -> None:
+    """Half a second before midnight to a second after, 23:59:60 between, with a host that is set back as well."""
+    period, day = 0.25, 86400.0
+    begun: float | None = None
+    midnight = 20_001 * day
+
+    def utc() -> float:
+        if begun is None:
+            return midnight - 3600.0  # while it starts; then it is set
+        passed = time.monotonic() - begun
+        return midnight - 0.5 + passed - (1.0 if passed > 1.5 else 0.0)
+
+    radar = radar_settings(period_s=period, udp=UdpSettings(address="127.0.0.1", port=0))
+    running = Running(tmp_path, radar, clock=HostClock(utc))
+    try:
+        port = running.service.video_port("smr-1")
+        begun = time.monotonic()
+        total = 10 * AZIMUTHS
+        rows = np.arange(total)
+        passed = rows * period / AZIMUTHS
+        shown = np.where(passed < 0.5, day - 0.5 + passed, np.where(passed < 1.5, day + passed - 0.5, passed - 1.5))
+        shown = np.floor(shown * 128) / 128
+        start = rows * 2 * np.pi / AZIMUTHS
+        datagrams, lengths = encode_datagrams(
+            np.full((total, RANGES), 30, np.uint8), start, start + 2 * np.pi / AZIMUTHS, shown, 1, sac=0, sic=1,
+            cell_duration_s=2 * VIDEO.range_step_m / LIGHT,
+        )  # fmt: skip
+        with socket.socket(type=socket.SOCK_DGRAM) as out:
+            for i in range(total):
+                wait = begun + passed[i] - time.monotonic()
+                if wait > 0:
+                    time.sleep(wait)
+                out.sendto(datagrams[i, : lengths[i]].tobytes(), ("127.0.0.1", port))
+        until(lambda: running.sensor("smr-1").counters["sweeps"] == total, "every sweep is taken")
+        state = running.sensor("smr-1")
+        assert state.counters["lost"] == state.counters["late"] == state.counters["azimuth_backwards"] == 0
+        assert state.last is not None
+        until(lambda: abs(running.sensor("smr-1").last - running.service.clock.now()) < 1.5, "near arrival")  # type: ignore[operator]
+    finally:
+        running.service.stop()
