@@ -183,10 +183,10 @@ class SurfaceService:
 
     def video(self, radar: str) -> Video:
         """The newest turn of a radar."""
-        if radar not in self._workers:
+        if radar not in self._octets:
             raise UnknownId(radar)
-        worker = self._workers[radar]
-        if worker.last_time is None:
+        worker = self._workers.get(radar)
+        if worker is None or worker.last_time is None:
             raise Refused(f"radar {radar} has not been heard yet")
         return Video(worker.site, worker.chain.newest, worker.last_time)
 

@@ -18,14 +18,16 @@ from typing import Any
 import numpy as np
 
 from app.assembly import FRONT_END, build_parts, chain_of
-from app.contract import FrontEnd, PictureListener, Readiness, Refused, ReplayControl, UnknownId, Video
+from app.contract import FrontEnd, PictureListener, Readiness, Refused, RefusedTime, ReplayControl, UnknownId, Video
+from app.ingest.octets import OctetIntake
+from app.runtime.clocks import FeedTimes
 from app.runtime.front_end import FrontEndSwitch
 from app.runtime.radar_worker import RadarWorker, Turn
 from app.settings import RadarSettings, Settings
 from pipeline.airport.model import Airport
 from pipeline.picture import Alert, AlertChange, AlertTarget, Picture, RunwayState, SensorState, Visibility
 from pipeline.sites import NodeSite, RadarSite
-from pipeline.tables import NodeEvents, Source, TargetReports, Tracks, VideoFormat
+from pipeline.tables import NodeEvents, Source, Sweeps, TargetReports, Tracks, VideoFormat
 from tests.support.small_airport import as_geojson, small_airport
 
 ALERT_EVERY_S = 40.0
@@ -79,7 +81,11 @@ def parts_on(site: RadarSite, index: int) -> FrontEndSwitch:
 
 
 class FakeService:
-    """Implements `app.contract.Service`; `start` moves the targets in a thread at `rate_hz` pictures a second."""
+    """Implements `app.contract.Service`; `start` moves the targets in a thread at `rate_hz` pictures a second.
+
+    ready: False as while a service starts, when it takes nothing. What is submitted lies in node_events, target_reports
+    and sweeps; between two pictures as many tables are taken as `limits.rows_queued` allows.
+    """
 
     def __init__(
         self,
@@ -109,7 +115,13 @@ class FakeService:
         self.rate_hz = rate_hz
         self.node_events: list[NodeEvents] = []
         self.target_reports: list[TargetReports] = []
-        self.sweeps: list[bytes] = []
+        self.sweeps: list[Sweeps] = []
+        self._times = {
+            "nodes": FeedTimes("event", self.settings.clocks.nodes, [one.id for one in self.nodes]),
+            "reports": FeedTimes("report", self.settings.clocks.reports),
+        }
+        self._octets = {site.id: OctetIntake(site, index) for index, site in enumerate(self.radars)}
+        self._waiting = 0
         self.ready = True
         self.runways = {
             one.id: RunwayState(one.id, in_use=one.ends[0].designator if i == 0 else None)
@@ -186,6 +198,7 @@ class FakeService:
                 timings={"detect": 0.0011, "extract": 0.0004, "track": 0.0006},
             )
             self._newest = picture
+            self._waiting = 0
             changes, self._changes = tuple(self._changes), []
             listeners = tuple(self._listeners)
         for listener in listeners:
@@ -271,7 +284,7 @@ class FakeService:
             self.step()
 
     def readiness(self) -> Readiness:
-        return Readiness({"database": True, "warm": True, "picture": self.ready and self._newest is not None})
+        return Readiness({"database": True, "warm": self.ready, "picture": self.ready and self._newest is not None})
 
     def picture(self) -> Picture | None:
         return self._newest
@@ -287,6 +300,13 @@ class FakeService:
 
     def sensors(self) -> tuple[SensorState, ...]:
         now = time.time()
+        events, reports = (sum(map(len, tables)) for tables in (self.node_events, self.target_reports))
+        heard = SensorState("reports", "report", "ok", now, counters={"taken": reports})
+        others = (
+            self._times["nodes"].shown(SensorState("nodes", "node", "ok", now, True, counters={"taken": 7 + events})),
+        )
+        if reports or self._times["reports"].heard:
+            others += (self._times["reports"].shown(heard),)
         return (
             SensorState(
                 "smr-1", "radar", "degraded" if "smr-1" in self.cut else "ok", now, True, self.cut.get("smr-1", ""),
@@ -296,14 +316,14 @@ class FakeService:
                 "smr-2", "radar", "silent", now - 60, False, "nothing heard for 60 s", {"sweeps": 10},
                 self._switches["smr-2"].names,
             ),
-            SensorState("nodes", "node", "ok", now, True, counters={"taken": 7}),
+            *others,
         )  # fmt: skip
 
     def video(self, radar: str) -> Video:
         site = next((one for one in self.radars if one.id == radar), None)
         if site is None:
             raise UnknownId(radar)
-        if radar == "smr-2":
+        if radar == "smr-2" or not self.ready:
             raise Refused("radar smr-2 has not been heard yet")
         rng = np.random.default_rng(int(time.time()))
         amplitude = rng.rayleigh(14.0, (site.video.azimuths, site.video.ranges)).clip(0, 255).astype(np.uint8)
@@ -326,9 +346,15 @@ class FakeService:
     def _switch(self, radar: str) -> FrontEndSwitch:
         if radar not in self._switches:
             raise UnknownId(radar)
+        self._started()
         return self._switches[radar]
 
+    def _started(self) -> None:
+        if not self.ready:
+            raise Refused("the service is still starting")
+
     def acknowledge(self, alert: int, by: str) -> Alert:
+        self._started()
         with self._lock:
             live = self._alerts.get(alert)
             if live is None:
@@ -336,22 +362,30 @@ class FakeService:
                     raise Refused(f"alert {alert} is cleared")
                 raise UnknownId(alert)
             now = time.time()
-            made = replace(live, state="acknowledged", acknowledged_at=now, acknowledged_by=by, updated_at=now)
-            self._change("acknowledge", made, now)
-            return made
+            if live.state != "acknowledged":
+                live = replace(
+                    live, state="acknowledged", acknowledged_at=now, acknowledged_by=by, updated_at=now, aural=False
+                )
+            self._change("acknowledge", live, now)
+            return live
 
     def set_runway(
         self, runway: str, *, open: bool | None, in_use: str | None, visibility: Visibility | None
     ) -> RunwayState:
+        self._started()
         with self._lock:
             state = self.runways.get(runway)
             if state is None:
                 raise UnknownId(runway)
             if in_use and in_use not in runway.split("/"):
-                raise Refused(f"{in_use} is not a direction of {runway}")
+                raise Refused(f"runway {runway} has the directions {' and '.join(runway.split('/'))}")
+            if visibility not in (None, "normal", "low"):
+                raise Refused('visibility is "normal" or "low"')
             if open is not None:
                 state = replace(state, open=open)
-            if in_use is not None:
+            if in_use and not state.open:
+                raise Refused(f"runway {runway} is closed; open it to put it in use")
+            if in_use is not None or not state.open:
                 state = replace(state, in_use=in_use or None)
             if visibility is not None:
                 state = replace(state, visibility=visibility)
@@ -359,20 +393,31 @@ class FakeService:
             return state
 
     def submit_sweeps(self, radar: str, body: bytes) -> dict[str, int]:
-        if radar not in {one.id for one in self.radars}:
+        if radar not in self._octets:
             raise UnknownId(radar)
-        if not body.startswith(b"ASWP"):
-            raise Refused("the body does not begin with the header of sweeps")
-        self.sweeps.append(body)
-        return {"taken": 1, "dropped": 0}
+        self._started()
+        blocks, counted = self._octets[radar].take(body)
+        self.sweeps += blocks
+        return counted
 
     def submit_node_events(self, events: NodeEvents) -> dict[str, int]:
-        self.node_events.append(events)
-        return {"taken": len(events)}
+        return self._take("nodes", events, self.node_events)
 
     def submit_target_reports(self, reports: TargetReports) -> dict[str, int]:
-        self.target_reports.append(reports)
-        return {"taken": len(reports)}
+        return self._take("reports", reports, self.target_reports)
+
+    def _take(self, kind: str, table: Any, tables: list[Any]) -> dict[str, int]:
+        self._started()
+        good, refused, why = self._times[kind].judge(table, time.time())
+        if refused and not len(good):
+            raise RefusedTime(why, refused)
+        with self._lock:
+            if self._waiting >= self.settings.limits.rows_queued:
+                raise Refused(f"the queue for {kind} is full")
+            if len(good):
+                self._waiting += 1
+                tables.append(good)
+        return {"taken": len(good), **{f"refused_{reason}": count for reason, count in refused.items()}}
 
 
 def main() -> None:

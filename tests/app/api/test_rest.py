@@ -13,9 +13,11 @@ import pytest
 from PIL import Image
 
 from app.api.scan_picture import index_table
+from app.ingest.octets import encode_sweeps
 from pipeline.sites import RadarSite
 from pipeline.tables import VideoFormat
 from tests.support.running import Server, until
+from tests.support.sweeps import sweeps_of
 
 READS = [
     ("/health/live", 200),
@@ -163,8 +165,11 @@ def test_bad_acknowledgements(http: httpx.Client, body: bytes, status: int) -> N
 
 def test_runways_are_opened_closed_and_turned(http: httpx.Client) -> None:
     path = "/api/v1/runways/06-24/state"
-    made = http.put(path, json={"open": False, "in_use": "24", "visibility": "low"}).json()["runway"]
-    assert (made["open"], made["in_use"], made["visibility"]) == (False, "24", "low")
+    made = http.put(path, json={"open": True, "in_use": "24", "visibility": "low"}).json()["runway"]
+    assert (made["open"], made["in_use"], made["visibility"]) == (True, "24", "low")
+    made = http.put(path, json={"open": False}).json()["runway"]
+    assert (made["open"], made["in_use"], made["visibility"]) == (False, None, "low")
+    assert http.put(path, json={"in_use": "24"}).status_code == 409
     made = http.put("/api/v1/runways/06%2F24/state", json={"open": True, "in_use": ""}).json()["runway"]
     assert (made["open"], made["in_use"], made["visibility"]) == (True, None, "low")
     assert http.put("/api/v1/runways/06/24/state", json={"visibility": "normal"}).status_code == 200
@@ -204,10 +209,12 @@ def test_bad_node_events_are_refused_whole(http: httpx.Client, server: Server, b
     assert len(server.service.node_events) == before
 
 
-def test_sweeps_come_in_as_octets(http: httpx.Client) -> None:
+def test_sweeps_come_in_as_octets(http: httpx.Client, server: Server) -> None:
     octets = {"content-type": "application/octet-stream"}
     path = "/api/v1/radars/smr-1/sweeps"
-    assert http.post(path, content=b"ASWP....", headers=octets).json() == {"taken": 1, "dropped": 0}
+    site = server.service.radars[0]
+    body = encode_sweeps(sweeps_of(site, rows=8), site)
+    assert http.post(path, content=body, headers=octets).json() == {"taken": 8}
     assert http.post(path, content=b"something else", headers=octets).status_code == 422
     assert http.post("/api/v1/radars/nobody/sweeps", content=b"ASWP", headers=octets).status_code == 404
     assert http.post(path, content=b"ASWP", headers={"content-type": "text/plain"}).status_code == 415
