@@ -9,6 +9,7 @@ import { byId, el, keyed, setText } from './dom.js';
 
 const POLL_MS = 500;
 const WATERMARKS = 12;
+const FIGURE_SPACE = '\u2007';
 /** The picture's own time is shown unless it is this far (s of the recording, at the recorded pace) from where the replay stands. */
 const APART_S = 3;
 
@@ -33,6 +34,8 @@ export class ReplayBar {
     /** questions and orders are numbered, so that an old answer does not undo a newer order */
     this.number = 0;
     this.held = false;
+    /** @type {string|null} of the feed when the service was last asked */
+    this.epoch = null;
     this.mark = this.watermark(stage);
     this.speeds = SPEEDS.map((speed) => el('button', { type: 'button', text: `${speed}×`, onclick: () => this.steer({ speed }) }));
     byId('replay-speed').append(...this.speeds);
@@ -74,6 +77,11 @@ export class ReplayBar {
       this.picture.setPace(1, nowMs);
       return;
     }
+    if (this.epoch !== this.picture.epoch) {
+      // somebody sought
+      this.epoch = this.picture.epoch;
+      this.askedMs = -Infinity;
+    }
     if (nowMs - this.askedMs >= POLL_MS && !document.hidden) this.ask(nowMs);
     this.met.take(this.picture.alerts.values());
     this.say();
@@ -101,7 +109,9 @@ export class ReplayBar {
     setText(byId('replay-time'), clock(time));
     setText(byId('replay-begin'), clock(state.begin));
     setText(byId('replay-end'), clock(state.end));
-    setText(byId('replay-done'), `${span(time - state.begin)} / ${span(state.end - state.begin)}`);
+    const whole = span(state.end - state.begin);
+    // of one width, or the line would change its length under the pointer
+    setText(byId('replay-done'), `${span(time - state.begin).padStart(whole.length, FIGURE_SPACE)} / ${whole}`);
     this.speeds.forEach((button, i) => button.setAttribute('aria-pressed', String(SPEEDS[i] === state.speed)));
     for (const [key, value] of /** @type {['min'|'max', number][]} */ ([['min', state.begin], ['max', state.end]])) {
       if (Number(this.seek[key]) !== value) this.seek[key] = String(value);
