@@ -64,7 +64,7 @@ class Running:
         if settings.view3d:
             from app.view3d import View3D, router
 
-            self.view3d = View3D(airport, settings.mode)
+            self.view3d = View3D(airport, settings.mode, replay=self.service.replay)
             view_router = router(self.view3d, settings)
         self.app = create_app(self.service, hub=self.hub, store=self.store, view3d_router=view_router)
         self._ends = ExitStack()

@@ -19,6 +19,7 @@ from app.api.middleware import Guard
 from app.api.pages import pages_router
 from app.api.parts import parts_router
 from app.api.readsb import readsb_router
+from app.api.replay import replay_router
 from app.api.surveillance import surveillance_router
 from app.api.video import video_router
 from app.contract import Service
@@ -68,6 +69,7 @@ def create_app(service: Service, *, hub: Hub, store: Store | None, view3d_router
     app.include_router(surveillance_router(context))
     app.include_router(video_router(context))
     app.include_router(parts_router(context))
+    app.include_router(replay_router(context))
     app.include_router(intake_router(context))
     app.include_router(readsb_router(context))
     app.include_router(metrics_router(context))

@@ -75,6 +75,11 @@ def intake_router(context: Context) -> APIRouter:
     return router
 
 
+async def json_body(request: Request) -> bytes:
+    """The body of a request with JSON in it. Raises ApiProblem (415) for another content type."""
+    return await _body(request, JSON)
+
+
 async def _body(request: Request, media_type: str) -> bytes:
     given = request.headers.get("content-type", "").split(";")[0].strip().lower()
     if given != media_type:

@@ -83,8 +83,10 @@ class Client:
             self._view.idle_since = self.hub.loop_time()
             self._view = None
 
-    def begin_again(self) -> None:
-        """The epoch changed: send a snapshot next. Alerts that wait are still sent."""
+    def begin_again(self, *, forget_alerts: bool) -> None:
+        """The epoch changed: send a snapshot next. forget_alerts: alert messages that wait are void."""
+        if forget_alerts:
+            self._alerts.clear()
         if self._view is not None:
             self._view = self.hub.stream.view(self._view.filter)
             self._view.clients += 1

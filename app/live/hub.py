@@ -40,8 +40,8 @@ class Follower(Protocol):
     def alert(self, text: str) -> None:
         """Queue an alert message."""
 
-    def begin_again(self) -> None:
-        """The epoch changed."""
+    def begin_again(self, *, forget_alerts: bool) -> None:
+        """The epoch changed. forget_alerts: alert messages that still wait are void."""
 
     def wake(self) -> None:
         """There is something to look at."""
@@ -53,7 +53,8 @@ class Follower(Protocol):
 class Hub:
     """One stream of pictures and alerts with `epoch` and `seq`, shared by all clients.
 
-    `publish` may be called from any thread; everything else belongs to the event loop that called `start`.
+    `publish` and `begin_anew` may be called from any thread; everything else belongs to the event loop that called
+    `start`.
     """
 
     def __init__(self, service: Service, settings: Settings) -> None:
@@ -72,6 +73,7 @@ class Hub:
         self._newest: Picture | None = None
         self._changes: deque[AlertChange] = deque(maxlen=WAITING_CHANGES)
         self._scheduled = False
+        self._anew = False
         self._loop: asyncio.AbstractEventLoop | None = None
         self._watch: asyncio.Task[None] | None = None
         self._alerts: deque[tuple[int, float, str]] = deque()
@@ -98,6 +100,17 @@ class Hub:
             loop.call_soon_threadsafe(self._take)
         except RuntimeError:  # the loop has been closed: the service is ending
             self._loop = None
+
+    def begin_anew(self) -> None:
+        """What was shown is void, as after a seek in a recording: the next picture begins a new epoch for all clients.
+
+        To be called between the last picture of before and the first of after. Pictures and alert changes of before
+        that no client has been told of yet are forgotten.
+        """
+        with self._lock:
+            self._anew = True
+            self._newest = None
+            self._changes.clear()
 
     def start(self) -> None:
         """Begin on the running event loop."""
@@ -232,29 +245,36 @@ class Hub:
             picture, self._newest = self._newest, None
             changes = list(self._changes)
             self._changes.clear()
+            anew = self._anew and picture is not None
+            self._anew = self._anew and not anew
         now = self.loop_time()
         wound_back = picture is not None and self.picture is not None and picture.time < self.picture.time - 1.0
-        if wound_back:
-            self._begin_epoch()
+        if anew or wound_back:
+            self._begin_epoch(forget_alerts=anew)
         for change in changes:
             self._alert(change, now)
         if picture is not None:
             self.seq += 1
             self.picture, self.picture_seq = picture, self.seq
-            if wound_back:
+            if anew or wound_back:
                 self._follow(now)
             self._tick(now)
             self._status(picture, now)
 
-    def _begin_epoch(self) -> None:
-        """Time stepped back (a replay was wound): what clients hold is void, all of them start again."""
+    def _begin_epoch(self, *, forget_alerts: bool) -> None:
+        """What clients hold is void (a seek, or time stepped back): all of them start again.
+
+        forget_alerts: alert messages that clients have not taken yet are void too. Not when only the clock stepped
+        back: then every alert is still true and none may be lost.
+        """
         self.epoch = secrets.token_hex(4)
         self.stream = Stream(self.stream.keep_s)
         self._alerts.clear()
         self._deltas.clear()
         self._snapshots.clear()
+        self._status_key = None
         for client in self.clients:
-            client.begin_again()
+            client.begin_again(forget_alerts=forget_alerts)
 
     def _alert(self, change: AlertChange, now: float) -> None:
         self.seq += 1

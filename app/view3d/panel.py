@@ -8,6 +8,7 @@ from math import degrees, isfinite
 
 import numpy as np
 
+from app.contract import ReplayState
 from app.view3d.labels import KNOTS
 from app.view3d.movers import Frame, Target
 from pipeline.airport.model import Airport
@@ -25,16 +26,24 @@ def _line(text: str, style: str) -> str:
     return f'<div style="{style}">{text}</div>'
 
 
-def status(airport: Airport, mode: str, picture: Picture | None, age: float | None) -> str:
-    """The head of the panel as HTML. age: seconds since the newest picture came."""
+def status(
+    airport: Airport, mode: str, picture: Picture | None, age: float | None, replay: ReplayState | None = None
+) -> str:
+    """The head of the panel as HTML. age: seconds since the newest picture came, or since the replay was let go on.
+
+    replay: where the replay stands; while it is paused no picture is awaited, so none is lost.
+    """
     rows = []
-    if mode != "live":
-        text = DEMO_TEXT if mode == "demo" else "REPLAY of a recording"
+    if mode == "replay":
+        look = "background:#4b3f73;color:#fff;padding:6px 8px;border-radius:4px;font-weight:700;font-size:15px"
+        rows.append(_line(_replay_words(picture, replay), look))
+    elif mode != "live":
+        text = DEMO_TEXT
         rows.append(_line(text, "background:#4b3f73;color:#fff;padding:4px 8px;border-radius:4px;font-weight:700"))
     if picture is None or age is None:
         rows.append(_line("waiting for the first picture", "color:#f2b441;font-weight:700"))
         return _boxed(rows)
-    if age > LOST_S:
+    if _lost(age, replay):
         text = f"FEED LOST: picture {age:.0f} s old"
         rows.append(_line(text, "background:#c81e1e;color:#fff;padding:6px 8px;border-radius:4px;font-weight:700"))
     clock = datetime.fromtimestamp(picture.time, UTC).strftime("%H:%M:%S")
@@ -53,6 +62,22 @@ def status(airport: Airport, mode: str, picture: Picture | None, age: float | No
     if not live:
         rows.append(_line("no alerts", "color:#8796a3"))
     return _boxed(rows)
+
+
+def _lost(age: float, replay: ReplayState | None) -> bool:
+    if replay is None:
+        return age > LOST_S
+    return replay.playing and age > LOST_S / min(1.0, replay.speed)
+
+
+def _replay_words(picture: Picture | None, replay: ReplayState | None) -> str:
+    """That it is a replay, with the date and time of what is shown."""
+    time = picture.time if picture is not None else replay.time if replay is not None else None
+    shown = "of a recording" if time is None else datetime.fromtimestamp(time, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+    how = "not live"
+    if replay is not None:
+        how += f", {replay.speed:g} times the recorded pace" if replay.playing else ", paused"
+    return f'REPLAY {shown}<div style="font-weight:400;font-size:12px">{how}</div>'
 
 
 def legend() -> str:

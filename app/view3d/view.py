@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from app.contract import ReplayControl, ReplayState
 from app.view3d import panel
 from app.view3d.ground import Ground, build_ground
 from app.view3d.movers import Frame, Movers, outline
@@ -32,16 +33,23 @@ class View3D:
     """Shows every picture that `update` is given, the newest one only. viser is imported by `start`, not before.
 
     host, port: where viser listens; it must not be reachable from outside, since it knows neither users nor origins.
-    period_s: time between two updates of the scene.
+    period_s: time between two updates of the scene. replay: where the replay stands, when one is shown.
     """
 
     def __init__(
-        self, airport: Airport, mode: str = "live", host: str = "127.0.0.1", port: int = 0, period_s: float = 0.4
+        self,
+        airport: Airport,
+        mode: str = "live",
+        host: str = "127.0.0.1",
+        port: int = 0,
+        period_s: float = 0.4,
+        replay: ReplayControl | None = None,
     ) -> None:
         self.airport = airport
         self.mode = mode
         self.host = host
         self.ready = threading.Event()
+        self._replay = replay
         self._asked_port = port
         self._period_s = period_s
         self._latest: Picture | None = None
@@ -159,7 +167,7 @@ class View3D:
                     status_at = begun
                     age = begun - self._arrived if frame is not None else None
                     shown = None if frame is None else frame.picture
-                    self._status.content = panel.status(self.airport, self.mode, shown, age)
+                    self._status.content = panel.status(self.airport, self.mode, shown, age, self._stands(begun))
             except Exception:
                 self._counts["failed"] += 1
                 if self._counts["failed"] in (1, 10, 100, 1000):
@@ -168,6 +176,15 @@ class View3D:
             earliest = begun + URGENT_S
             self._over.wait(max(0.0, earliest - time.monotonic()))
             due = begun + wait
+
+    def _stands(self, now: float) -> ReplayState | None:
+        """Where the replay stands; from a pause on, the age of the picture counts anew."""
+        if self._replay is None:
+            return None
+        state = self._replay.state()
+        if not state.playing:
+            self._arrived = now
+        return state
 
     def _refresh(self, viewer: Any, frame: Frame) -> None:
         try:

@@ -2,9 +2,9 @@
 
 /**
  * @param {import('./display.js').Display} display @param {import('./feed/live.js').LiveFeed} feed
- * @param {import('./panels/status.js').StatusBar} status
+ * @param {import('./panels/status.js').StatusBar} status @param {import('./panels/replay.js').ReplayBar} replay
  */
-export function exposeHook(display, feed, status) {
+export function exposeHook(display, feed, status, replay) {
   const { picture, view, stage } = display;
   const hook = {
     /** counts of everything */
@@ -25,6 +25,8 @@ export function exposeHook(display, feed, status) {
     frameCostMs: () => stage.costMs,
     lastError: () => stage.lastError,
     position: () => picture.position(),
+    time: () => picture.time,
+    replay: () => (replay.state ? { ...replay.state } : null),
   };
   Object.defineProperty(window, 'airside', { value: Object.freeze(hook), writable: false });
 }

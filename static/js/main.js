@@ -13,6 +13,7 @@ import { byId, setText } from './panels/dom.js';
 import { makeHelp } from './panels/help.js';
 import { TargetList } from './panels/list.js';
 import { ProcessingPanel } from './panels/processing.js';
+import { ReplayBar } from './panels/replay.js';
 import { RunwayPanel } from './panels/runways.js';
 import { SensorPanel } from './panels/sensors.js';
 import { StatusBar } from './panels/status.js';
@@ -45,6 +46,7 @@ const error = (/** @type {string} */ text) => status.toast(text, 'error');
 const alerts = new AlertPanel(picture, { onOpen: (alert) => display.showAlert(alert), onError: error });
 const runways = new RunwayPanel(picture, { onError: error, onOpen: (id) => display.showRunway(id) });
 const sensors = new SensorPanel(picture);
+const replay = new ReplayBar(picture, host, { onError: error });
 const processing = new ProcessingPanel(picture, { onError: error });
 const target = new TargetPanel(picture, {
   onClose: () => display.select(null),
@@ -126,6 +128,9 @@ const actions = {
   measure,
   follow,
   sound: toggleSound,
+  play: () => replay.toggle(),
+  skip: (seconds) => replay.skip(seconds),
+  speed: (step) => replay.faster(step),
   help: help.toggle,
   escape: () => {
     runways.close();
@@ -194,13 +199,15 @@ function refresh() {
   const work = [
     () => feed.watch(nowMs),
     () => status.update(picture, feed, link, stage.failing, nowMs),
+    () => replay.update(nowMs),
     () => alerts.update(),
     () => runways.update(display.alertedRunways()),
     () => sensors.update(),
     () => processing.update(nowMs),
     () => target.update(display.selected, display.following),
     () => {
-      const live = picture.liveAlerts();
+      // a replay that stands still does not call
+      const live = picture.pace === 0 ? [] : picture.liveAlerts();
       sound.update(live, needsAttention, nowMs);
       byId('sound').classList.toggle('is-wanted', !sound.armed && live.some(needsAttention));
     },
@@ -248,11 +255,13 @@ async function loadAirport(waitMs = 1000) {
 
 const track = Number.parseInt(query.get('track') ?? '', 10);
 if (Number.isFinite(track)) display.select(track);
-exposeHook(display, feed, status);
+exposeHook(display, feed, status, replay);
 stage.start();
 feed.start();
 setInterval(refresh, PANELS_EVERY_MS);
 loadAirport();
 fetchCleared().then((past) => {
+  // what a replay has not come to yet is not over
+  if (picture.mode === 'replay') return;
   for (const alert of past.reverse()) if (!picture.alerts.has(alert.id)) picture.clear(alert);
 }).catch(() => {});

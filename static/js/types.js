@@ -97,6 +97,18 @@
  */
 
 /**
+ * `GET /api/v1/replay`: where the replay of a recording stands. Times are UTC s of the recording.
+ * @typedef {object} ReplayState
+ * @property {string} source  name of the recording
+ * @property {number} begin
+ * @property {number} end
+ * @property {number} time
+ * @property {boolean} playing
+ * @property {number} speed  times the recorded pace
+ * @property {number[]} gaps
+ */
+
+/**
  * What is shown of one target: its newest track and how it moves on the screen.
  * @typedef {object} Target
  * @property {Track} track

@@ -12,6 +12,7 @@ import uvicorn
 from app.airports import load_airport
 from app.api.application import create_app
 from app.live.hub import Hub
+from tests.support.fake_replay import FakeReplay
 from tests.support.fake_service import FakeService
 
 PERIOD_S = 0.25
@@ -20,9 +21,10 @@ PERIOD_S = 0.25
 class Serving:
     """Pictures at 4 Hz in one thread, the application in another; `down` and `up` leave the port as it is."""
 
-    def __init__(self, targets: int = 40) -> None:
+    def __init__(self, targets: int = 40, replay: FakeReplay | None = None) -> None:
         airport, geojson = load_airport("LFPO")
-        self.service = FakeService(targets=targets, airport=airport, geojson=geojson)
+        self.service = FakeService(targets=targets, airport=airport, geojson=geojson, replay=replay)
+        self.replay = replay
         self.port = 0
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
@@ -38,7 +40,8 @@ class Serving:
 
     def _move(self) -> None:
         while not self._over.wait(PERIOD_S):
-            self.service.step()
+            if not self.service.still():
+                self.service.step()
 
     def up(self) -> None:
         """Serve; returns when connections are taken."""
@@ -48,6 +51,8 @@ class Serving:
         self.port = listening.getsockname()[1]
         hub = Hub(self.service, self.service.settings)
         self._unlisten = self.service.listen(hub.publish)
+        if self.replay is not None:
+            self.replay.on_seek.append(hub.begin_anew)
         application = create_app(self.service, hub=hub, store=None)
         config = uvicorn.Config(application, log_level="error", timeout_graceful_shutdown=1)
         self._server = uvicorn.Server(config)

@@ -28,6 +28,7 @@ from pipeline.airport.model import Airport
 from pipeline.picture import Alert, AlertChange, AlertTarget, Picture, RunwayState, SensorState, Visibility
 from pipeline.sites import NodeSite, RadarSite
 from pipeline.tables import NodeEvents, Source, Sweeps, TargetReports, Tracks, VideoFormat
+from tests.support.fake_replay import FakeReplay
 from tests.support.small_airport import as_geojson, small_airport
 
 ALERT_EVERY_S = 40.0
@@ -96,9 +97,11 @@ class FakeService:
         airport: Airport | None = None,
         geojson: dict[str, Any] | None = None,
         seed: int = 1,
+        replay: FakeReplay | None = None,
     ) -> None:
         self.settings = settings or Settings(
-            mode="demo", radars=(RadarSettings(id="smr-1", latitude=48.72, longitude=2.38),)
+            mode="demo" if replay is None else "replay",
+            radars=(RadarSettings(id="smr-1", latitude=48.72, longitude=2.38),),
         )
         self.airport = airport or small_airport()
         self.airport_geojson = geojson or as_geojson(self.airport)
@@ -111,7 +114,8 @@ class FakeService:
         self._switches = {site.id: parts_on(site, index) for index, site in enumerate(self.radars)}
         self.cut: dict[str, str] = {}
         self.nodes = (NodeSite("node-1", -1450.0, -560.0, 2.6, hold="hold-w1", runway="06/24", simulated=True),)
-        self.replay: ReplayControl | None = None
+        self.replay: ReplayControl | None = replay
+        self._recording = replay
         self.rate_hz = rate_hz
         self.node_events: list[NodeEvents] = []
         self.target_reports: list[TargetReports] = []
@@ -135,9 +139,11 @@ class FakeService:
         self._next_alert = 1
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
-        self._began = 0.0
+        self._began = 0.0 if replay is None else replay.begin
         self._rng = np.random.default_rng(seed)
         self._movers = self._populate(targets)
+        if replay is not None:
+            replay.on_seek.append(self._wind)
 
     def _populate(self, targets: int) -> list[Mover]:
         lines = lines_of(self.airport, self._rng)
@@ -182,9 +188,24 @@ class FakeService:
             zone=np.where(len(self.airport.features) > 0, index % max(len(self.airport.features), 1), -1),
         )
 
+    def clock(self) -> float:
+        """UTC s: of the recording when one is replayed."""
+        return time.time() if self._recording is None else self._recording.time()
+
+    def still(self) -> bool:
+        """A replay is paused and its picture is made: there is nothing to show that is not shown."""
+        return self._recording is not None and self._newest is not None and self._newest.time == self.clock()
+
+    def _wind(self) -> None:
+        """Nothing of before the seek is left."""
+        with self._lock:
+            self._alerts.clear()
+            self._changes.clear()
+            self._newest = None
+
     def step(self, now: float | None = None) -> Picture:
         """Make the next picture and tell the listeners."""
-        now = time.time() if now is None else now
+        now = self.clock() if now is None else now
         with self._lock:
             self._began = self._began or now
             tracks = self.tracks_at(now - self._began, now)
@@ -207,7 +228,7 @@ class FakeService:
 
     def raise_alert(self, text: str = "Vehicle passed holding point W1", now: float | None = None) -> Alert:
         """Put an alert into the next picture."""
-        now = time.time() if now is None else now
+        now = self.clock() if now is None else now
         with self._lock:
             runway = self.airport.runways[0]
             targets = tuple(
@@ -234,7 +255,7 @@ class FakeService:
 
     def update_alert(self, id: int, now: float | None = None, **values: Any) -> Alert:
         """Change a live alert."""
-        now = time.time() if now is None else now
+        now = self.clock() if now is None else now
         with self._lock:
             alert = replace(self._alerts[id], updated_at=now, **values)
             self._change("update", alert, now)
@@ -242,7 +263,7 @@ class FakeService:
 
     def clear_alert(self, id: int, reason: str = "runway vacated", now: float | None = None) -> Alert:
         """Clear a live alert."""
-        now = time.time() if now is None else now
+        now = self.clock() if now is None else now
         with self._lock:
             alert = replace(self._alerts[id], state="cleared", cleared_at=now, clear_reason=reason, updated_at=now)
             self._change("clear", alert, now)
@@ -269,7 +290,7 @@ class FakeService:
 
     def start(self) -> None:
         """Move in a thread."""
-        self._began = time.time()
+        self._began = self._began or time.time()
         self._thread = threading.Thread(target=self._run, name="fake-surface", daemon=True)
         self._thread.start()
 
@@ -281,7 +302,8 @@ class FakeService:
 
     def _run(self) -> None:
         while not self._stop.wait(1.0 / self.rate_hz):
-            self.step()
+            if not self.still():
+                self.step()
 
     def readiness(self) -> Readiness:
         return Readiness({"database": True, "warm": self.ready, "picture": self.ready and self._newest is not None})
@@ -299,7 +321,7 @@ class FakeService:
         return end
 
     def sensors(self) -> tuple[SensorState, ...]:
-        now = time.time()
+        now = self.clock()
         events, reports = (sum(map(len, tables)) for tables in (self.node_events, self.target_reports))
         heard = SensorState("reports", "report", "ok", now, counters={"taken": reports})
         others = (

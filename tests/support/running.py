@@ -16,6 +16,7 @@ from app.api.application import create_app
 from app.live.hub import Hub
 from app.settings import FeedSettings, LimitsSettings, RadarSettings, Settings
 from app.store.store import Store
+from tests.support.fake_replay import FakeReplay
 from tests.support.fake_service import FakeService
 
 
@@ -46,9 +47,13 @@ def running(
     folder: Path | None = None, *, feed: FeedSettings | None = None, limits: LimitsSettings | None = None, **fake: Any
 ) -> Iterator[Server]:
     """Serve a fake service that stands still until the test calls `service.step()`."""
-    settings = settings_for_tests(feed=feed or FeedSettings(), limits=limits or LimitsSettings())
+    replay: FakeReplay | None = fake.get("replay")
+    mode = "demo" if replay is None else "replay"
+    settings = settings_for_tests(mode=mode, feed=feed or FeedSettings(), limits=limits or LimitsSettings())
     service = FakeService(settings, **fake)
     hub = Hub(service, settings)
+    if replay is not None:
+        replay.on_seek.append(hub.begin_anew)
     service.listen(hub.publish)
     store = None
     if folder is not None:

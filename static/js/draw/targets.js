@@ -27,7 +27,7 @@ export function advance(scene, nowMs) {
   const { picture, view } = scene;
   for (const group of [picture.targets, picture.leaving]) {
     for (const target of group.values()) {
-      [target.e, target.n] = positionAt(target, nowMs);
+      [target.e, target.n] = positionAt(target, nowMs, picture.pace);
       [target.x, target.y] = view.toScreen(target.e, target.n);
     }
   }

@@ -1,6 +1,6 @@
 // The picture as it stands: the feed's messages folded into targets, alerts, runways and sensors.
 
-import { moveTarget, newTarget } from '../model/motion.js';
+import { moveTarget, newTarget, repace } from '../model/motion.js';
 
 /** @typedef {import('../types.js').Track} Track */
 /** @typedef {import('../types.js').Target} Target */
@@ -36,6 +36,10 @@ export class PictureState {
     /** local clock when it came */
     this.timeMs = -Infinity;
     this.mode = 'live';
+    /** seconds of the picture in a second here: 1 but in a replay, 0 while that is paused */
+    this.pace = 1;
+    /** local clock since when it has been so */
+    this.paceMs = -Infinity;
     this.airport = '';
     /** true once a snapshot of this epoch is in */
     this.complete = false;
@@ -58,6 +62,7 @@ export class PictureState {
    */
   apply(message, nowMs) {
     if (message.mode) this.mode = String(message.mode);
+    if (this.mode === 'replay' && message.epoch && message.epoch !== this.epoch) this.begin(String(message.epoch));
     switch (message.type) {
       case 'welcome':
         return this.welcome(message);
@@ -81,6 +86,27 @@ export class PictureState {
         this.counters.unknown += 1;
         return 'ignored';
     }
+  }
+
+  /** The replay was set to another time: nothing of before is true any more. @param {string} epoch */
+  begin(epoch) {
+    this.epoch = epoch;
+    this.complete = false;
+    this.targets.clear();
+    this.leaving.clear();
+    this.alerts.clear();
+    this.cleared = [];
+    this.alertVersion += 1;
+    this.version += 1;
+  }
+
+  /** @param {number} pace as of `pace` @param {number} nowMs */
+  setPace(pace, nowMs) {
+    if (pace === this.pace) return;
+    for (const target of this.targets.values()) repace(target, nowMs, this.pace, pace);
+    for (const target of this.leaving.values()) repace(target, nowMs, this.pace, pace);
+    this.pace = pace;
+    this.paceMs = nowMs;
   }
 
   /** @param {Record<string, any>} message @returns {Outcome} */
@@ -214,7 +240,7 @@ export class PictureState {
   /** @param {Track} track @param {number} nowMs */
   put(track, nowMs) {
     const target = this.targets.get(track.id);
-    if (target) moveTarget(target, track, this.time, nowMs);
+    if (target) moveTarget(target, track, this.time, nowMs, this.pace);
     else this.targets.set(track.id, newTarget(track, this.time, nowMs));
     this.leaving.delete(track.id);
   }

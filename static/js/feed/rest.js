@@ -56,6 +56,20 @@ export async function chooseParts(radar, order) {
   return response.json();
 }
 
+/** @returns {Promise<import('../types.js').ReplayState>} where the replay stands */
+export const fetchReplay = async () => (await call('/api/v1/replay', { cache: 'no-store' }, 4000)).json();
+
+/**
+ * @param {{playing?: boolean, speed?: number, time?: number}} order what is left out stays
+ * @returns {Promise<import('../types.js').ReplayState>}
+ */
+export async function steerReplay(order) {
+  const response = await call('/api/v1/replay', {
+    method: 'PUT', headers: { 'content-type': 'application/json' }, body: JSON.stringify(order),
+  }, 60000);
+  return response.json();
+}
+
 /**
  * @typedef {object} VideoPicture
  * @property {ImageBitmap} image

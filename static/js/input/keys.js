@@ -18,6 +18,9 @@
  * @property {() => void} measure
  * @property {() => void} follow
  * @property {() => void} sound
+ * @property {() => boolean} play  false when nothing is replayed
+ * @property {(seconds: number) => boolean} skip
+ * @property {(step: number) => boolean} speed
  * @property {() => void} help
  * @property {() => void} escape
  */
@@ -35,7 +38,13 @@ export const MOUSE = [
   ['drag a label', 'pin it'], ['double click a label', 'release it'],
 ];
 
+/** Keys that do something in a replay only. @type {[string, string][]} */
+export const REPLAY_KEYS = [
+  ['space', 'play, pause'], [', .', '10 s back, 10 s on'], ['[ ]', 'slower, faster'],
+];
+
 const PAN_PX = 80;
+export const SKIP_S = 10;
 
 /**
  * @param {KeyboardEvent} event @param {KeyActions} act
@@ -61,6 +70,11 @@ export function onKey(event, act) {
     case '0': act.home(); return true;
     case '/': act.search(); return true;
     case '?': act.help(); return true;
+    case ' ': return focus?.matches('button, a, summary, select, [role=button]') ? false : act.play();
+    case ',': return act.skip(-SKIP_S);
+    case '.': return act.skip(SKIP_S);
+    case '[': return act.speed(-1);
+    case ']': return act.speed(1);
     default: break;
   }
   /** @type {Record<string, () => void>} */

@@ -30,6 +30,13 @@ export function clock(utc) {
   return Number.isNaN(date.getTime()) ? '--:--:--' : date.toISOString().slice(11, 19);
 }
 
+/** @param {number|null|undefined} utc seconds @returns {string} yyyy-mm-dd */
+export function date(utc) {
+  if (!isNumber(utc)) return '----------';
+  const made = new Date(utc * 1000);
+  return Number.isNaN(made.getTime()) ? '----------' : made.toISOString().slice(0, 10);
+}
+
 /** @param {number|null|undefined} seconds @returns {string} 12 s, 3:05, 1 h 20 */
 export function duration(seconds) {
   if (!isNumber(seconds)) return '–';

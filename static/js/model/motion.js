@@ -69,11 +69,13 @@ function age(track, pictureTime) {
 
 /**
  * Where the target is shown at `nowMs`.
- * @param {Target} target @param {number} nowMs @returns {[number, number]} m
+ * @param {Target} target @param {number} nowMs
+ * @param {number} [pace] seconds of the picture in a second here: 1 but in a replay, 0 while that is paused
+ * @returns {[number, number]} m
  */
-export function positionAt(target, nowMs) {
+export function positionAt(target, nowMs, pace = 1) {
   const since = Math.max(0, nowMs - target.baseMs);
-  const dt = Math.min(MAX_EXTRAPOLATION_S, target.ageS + since / 1000);
+  const dt = Math.min(MAX_EXTRAPOLATION_S * Math.max(1, pace), target.ageS + (since / 1000) * pace);
   const fade = Math.exp(-since / FADE_MS);
   return [
     target.track.east_m + target.ve * dt + target.offsetE * fade,
@@ -88,11 +90,29 @@ export function headingAt(target, nowMs) {
 }
 
 /**
+ * Go on from where the target is shown now at another pace, without a jump.
+ * @param {Target} target @param {number} nowMs @param {number} old @param {number} pace
+ */
+export function repace(target, nowMs, old, pace) {
+  const since = Math.max(0, nowMs - target.baseMs);
+  const fade = Math.exp(-since / FADE_MS);
+  target.ageS = Math.min(MAX_EXTRAPOLATION_S * Math.max(1, old), target.ageS + (since / 1000) * old);
+  // what the slower pace may not reach is a correction, and fades
+  const beyond = target.ageS - Math.min(target.ageS, MAX_EXTRAPOLATION_S * Math.max(1, pace));
+  target.ageS -= beyond;
+  target.offsetE = target.offsetE * fade + target.ve * beyond;
+  target.offsetN = target.offsetN * fade + target.vn * beyond;
+  target.headingOffset *= fade;
+  target.baseMs = nowMs;
+}
+
+/**
  * Take a newer state without a jump: what the old picture was off by fades away.
  * @param {Target} target @param {Track} track @param {number} pictureTime UTC s @param {number} nowMs
+ * @param {number} [pace] as for `positionAt`
  */
-export function moveTarget(target, track, pictureTime, nowMs) {
-  const [e, n] = positionAt(target, nowMs);
+export function moveTarget(target, track, pictureTime, nowMs, pace = 1) {
+  const [e, n] = positionAt(target, nowMs, pace);
   const heading = headingAt(target, nowMs);
   if (track.phase !== 'coasting') target.coastingSince = NaN;
   else if (target.track.phase !== 'coasting') target.coastingSince = pictureTime;
@@ -102,8 +122,8 @@ export function moveTarget(target, track, pictureTime, nowMs) {
   [target.ve, target.vn] = velocity(track);
   target.offsetE = 0;
   target.offsetN = 0;
-  const [e1, n1] = positionAt(target, nowMs);
-  if (Math.hypot(e - e1, n - n1) <= SNAP_M) {
+  const [e1, n1] = positionAt(target, nowMs, pace);
+  if (Math.hypot(e - e1, n - n1) <= SNAP_M * Math.max(1, pace)) {
     target.offsetE = e - e1;
     target.offsetN = n - n1;
   } else {

@@ -2,7 +2,7 @@
 
 import { acknowledge } from '../feed/rest.js';
 import { clock, duration, isNumber } from '../model/format.js';
-import { byId, el, keyed, setText } from './dom.js';
+import { NO_COMMANDS, byId, el, keyed, setText } from './dom.js';
 
 /** @typedef {import('../types.js').Alert} Alert */
 
@@ -86,6 +86,8 @@ export class AlertPanel {
     const eta = isNumber(alert.time_to_threshold_s) ? `  threshold in ${duration(alert.time_to_threshold_s).replace(' ', '\u00a0')}` : '';
     setText(part('.alert-detail'), [`${names}${eta}`, `since ${clock(alert.raised_at)}${alert.holding_point ? `  hold ${alert.holding_point}` : ''}${alert.degraded ? '  degraded' : ''}${alert.simulated ? '  SIM' : ''}`].filter(Boolean).join('\n'));
     const button = /** @type {HTMLButtonElement} */ (part('.alert-ack'));
+    // in a replay only what was acknowledged then is told
+    button.hidden = open && this.picture.mode === 'replay';
     button.disabled = !open || this.sending.has(alert.id);
     setText(button, open ? (this.sending.has(alert.id) ? '…' : 'ACK') : 'ACK’D');
     const label = open ? `Acknowledge alert ${alert.id}: ${alert.text}` : `Acknowledged${alert.acknowledged_by ? ` by ${alert.acknowledged_by}` : ''}`;
@@ -107,6 +109,10 @@ export class AlertPanel {
 
   /** @param {number} id */
   async acknowledge(id) {
+    if (this.picture.mode === 'replay') {
+      this.hooks.onError(NO_COMMANDS);
+      return;
+    }
     if (this.sending.has(id)) return;
     this.sending.add(id);
     this.update();

@@ -24,6 +24,9 @@ export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
+/** Why a control that commands the service is not there in a replay. */
+export const NO_COMMANDS = 'This is a replay: it shows what was recorded, and commands nothing';
+
 /** @param {string} id @returns {HTMLElement} @throws {Error} */
 export function byId(id) {
   const found = document.getElementById(id);

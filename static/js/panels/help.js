@@ -1,6 +1,6 @@
 // The help overlay: keys, mouse, and what the signs mean.
 
-import { KEYS, MOUSE } from '../input/keys.js';
+import { KEYS, MOUSE, REPLAY_KEYS } from '../input/keys.js';
 import { byId, el } from './dom.js';
 
 /** @type {[string, string][]} */
@@ -13,7 +13,7 @@ const SIGNS = [
 /** Fill the dialog once. @returns {{toggle: () => void, close: () => void}} */
 export function makeHelp() {
   const dialog = /** @type {HTMLDialogElement} */ (byId('help'));
-  for (const [id, rows] of /** @type {[string, [string, string][]][]} */ ([['help-keys', KEYS], ['help-mouse', MOUSE], ['help-signs', SIGNS]])) {
+  for (const [id, rows] of /** @type {[string, [string, string][]][]} */ ([['help-keys', KEYS], ['help-mouse', MOUSE], ['help-replay', REPLAY_KEYS], ['help-signs', SIGNS]])) {
     byId(id).append(...rows.flatMap(([key, words]) => [el('dt', { text: key }), el('dd', { text: words })]));
   }
   const toggle = () => (dialog.open ? dialog.close() : dialog.showModal());

@@ -65,7 +65,9 @@ export class ProcessingPanel {
   /** @param {number} nowMs */
   update(nowMs) {
     const radars = [...this.picture.sensors.values()].filter((one) => one.kind === 'radar' && Object.keys(one.parts ?? {}).length);
-    this.section.hidden = radars.length === 0;
+    // a replay works on what was detected then: there is nothing to choose
+    this.section.hidden = radars.length === 0 || this.picture.mode === 'replay';
+    if (this.section.hidden) return;
     setText(byId('processing-short'), this.box.open || radars.length !== 1 ? '' : Object.values(radars[0].parts ?? {}).join(' · '));
     if (!this.box.open) return;
     if (nowMs - this.askedMs >= POLL_MS && !document.hidden) {

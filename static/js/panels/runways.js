@@ -3,7 +3,7 @@
 import { setRunway } from '../feed/rest.js';
 import { countdown, isNumber } from '../model/format.js';
 import { nameOf } from '../model/label_text.js';
-import { byId, el, keyed, setText } from './dom.js';
+import { NO_COMMANDS, byId, el, keyed, setText } from './dom.js';
 
 /** @typedef {import('../types.js').RunwayState} RunwayState */
 
@@ -47,6 +47,11 @@ export class RunwayPanel {
 
   /** @param {HTMLElement} element @param {RunwayState} state */
   fill(element, state) {
+    const replay = this.picture.mode === 'replay';
+    const set = /** @type {HTMLButtonElement} */ (element.querySelector('.runway-set'));
+    set.disabled = replay;
+    set.title = replay ? NO_COMMANDS : '';
+    if (replay && this.menu) this.close();
     const occupants = state.occupants ?? [];
     const soon = isNumber(state.next_arrival_s) && state.next_arrival_s <= ARRIVAL_SOON_S;
     const stage = this.alerted.get(state.id);

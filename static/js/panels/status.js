@@ -1,6 +1,6 @@
 // The top bar and the banner: who we are, what kind of picture this is, how old it is, and whether it still comes.
 
-import { clock } from '../model/format.js';
+import { clock, date } from '../model/format.js';
 import { byId, setText } from './dom.js';
 
 /** @typedef {'ok'|'late'|'lost'|'starting'|'fault'} Health */
@@ -10,13 +10,16 @@ const FAULT_FRAMES = 5;
 /**
  * @param {number} nowMs @param {number} lastMessageMs @param {number} lastPictureMs local clock of the newest tracks
  * @param {number} periodS @param {number} startMs local clock when the page began to wait
+ * @param {number} pace seconds of the picture in a second here; 0 while a replay is paused, which then sends no tracks
+ * @param {number} paceMs local clock since when it has been so
  * @returns {Health} lost: nothing at all for twice the period (2 s at least); late: messages come, but no new tracks
  */
-export function healthOf(nowMs, lastMessageMs, lastPictureMs, periodS, startMs = 0) {
+export function healthOf(nowMs, lastMessageMs, lastPictureMs, periodS, startMs = 0, pace = 1, paceMs = -Infinity) {
   const limit = Math.max(2, 2 * periodS) * 1000;
   if (lastPictureMs === -Infinity && nowMs - startMs < 2 * limit) return 'starting';
   if (nowMs - lastMessageMs > limit) return 'lost';
-  if (nowMs - lastPictureMs > Math.max(3000, 3 * periodS * 1000)) return 'late';
+  const awaitedMs = Math.max(lastPictureMs, pace > 0 ? paceMs : nowMs);
+  if (nowMs - awaitedMs > Math.max(3000, 3 * periodS * 1000) / Math.min(1, pace || 1)) return 'late';
   return 'ok';
 }
 
@@ -48,13 +51,19 @@ export class StatusBar {
    * @param {number} nowMs
    */
   update(picture, feed, link, failing, nowMs) {
-    const found = healthOf(nowMs, feed.lastMessageMs, picture.timeMs, feed.periodS, this.startMs);
+    const found = healthOf(nowMs, feed.lastMessageMs, picture.timeMs, feed.periodS, this.startMs, picture.pace, picture.paceMs);
     const health = found !== 'lost' && failing >= FAULT_FRAMES ? 'fault' : found;
     this.health = health;
     const age = (nowMs - picture.timeMs) / 1000;
     setText(this.utc, clock(picture.time));
-    setText(this.age, Number.isFinite(age) ? `${age < 10 ? age.toFixed(1) : Math.round(age)} s` : '–');
+    const replay = picture.mode === 'replay';
+    byId('data-date').hidden = !replay;
+    setText(byId('data-date'), date(picture.time));
+    byId('data-clock-title').title = replay ? 'time of the recording, UTC' : 'time of the picture, UTC';
+    if (picture.pace === 0) setText(this.age, 'paused');
+    else setText(this.age, Number.isFinite(age) ? `${age < 10 ? age.toFixed(1) : Math.round(age)} s` : '–');
     document.body.dataset.health = health;
+    document.body.dataset.mode = picture.mode;
     const starting = health === 'starting';
     const text = bannerText(health, age, link);
     this.banner.hidden = !text;
@@ -63,7 +72,7 @@ export class StatusBar {
     const mode = picture.mode;
     this.badge.hidden = mode === 'live';
     setText(this.badge, mode === 'demo' ? 'DEMO · simulated' : mode === 'replay' ? 'REPLAY · not live' : mode);
-    setText(byId('link'), starting ? 'connecting' : health === 'ok' ? 'live' : health);
+    setText(byId('link'), starting ? 'connecting' : health === 'ok' ? (replay ? 'connected' : 'live') : health);
     setText(byId('count'), `${picture.targets.size} targets`);
   }
 
