@@ -84,6 +84,9 @@ async def test_what_waits_for_the_event_loop_is_forgotten_at_a_seek() -> None:
     service.listen(hub.publish)
     service.step(1001.0)  # waits: this coroutine has not given the loop up
     hub.begin_anew()
+    for _ in range(20):
+        await asyncio.sleep(0)  # the loop takes what waits: nothing
+    assert hub.epoch == epoch, "the new epoch begins with the first picture of after"
     service._alerts.clear()
     service.step(1300.0)
     await reached(lambda: any(one.get("time") == 1300.0 and one.get("topic") == "alerts" for one in sent))
