@@ -26,6 +26,9 @@ SLOWEST, FASTEST = 0.1, 64.0
 STILL_S = 0.5
 """While it stands still the picture is sent again this often, so that displays know that it is all there is."""
 
+HOLE_S = 3.0
+"""A hole in the recording longer than this is passed over at once, so that nobody waits before a picture that is old."""
+
 CATCH_UP_S = 1.0
 """When the engine cannot keep the pace, what it is behind by more than this is forgiven."""
 
@@ -215,6 +218,8 @@ class JournalPlayer:
                 if self._ending or self._wanted.time is not None:
                     return False
                 if self._wanted.playing:
+                    if at - self._time > HOLE_S:
+                        pace.stand(at)
                     pause = pace.pause(at, self._wanted.speed)
                     if pause <= 0.0:
                         return True

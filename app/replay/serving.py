@@ -55,7 +55,7 @@ class ReplayRunning:
             from app.view3d import View3D
             from app.view3d import router as view_router
 
-            self.view3d = View3D(run.airport, "replay")
+            self.view3d = View3D(run.airport, "replay", replay=player)
             router = view_router(self.view3d, self.settings)
         self.app = create_app(self.service, hub=self.hub, store=None, view3d_router=router)
         self._ends = ExitStack()
