@@ -27,7 +27,7 @@ STILL_S = 0.5
 """While it stands still the picture is sent again this often, so that displays know that it is all there is."""
 
 HOLE_S = 3.0
-"""A hole in the recording longer than this is passed over at once, so that nobody waits before a picture that is old."""
+"""A hole in the recording longer than this is passed over at once: nobody waits before an old picture."""
 
 CATCH_UP_S = 1.0
 """When the engine cannot keep the pace, what it is behind by more than this is forgiven."""
