@@ -59,6 +59,9 @@ def node_site(node: NodeSettings, airport: Airport) -> NodeSite:
     )
 
 
+AHEAD_MARGIN_S = 1.0
+"""The engine refuses what is dated so much further ahead than the judges of the clocks let pass, s."""
+
 FRONT_END = {"detect": "detector", "extract": "extractor", "bearing": "bearing"}
 """The verbs whose parts work on one radar's video, and what `RadarChain` calls the part."""
 
@@ -124,7 +127,13 @@ def surface_engine(
             monitor.set_runway(runway.id, open=runway.open, in_use=runway.in_use or "", visibility=runway.visibility)
         except (KeyError, ValueError) as error:
             raise SettingsError(f"runways: {error}") from error
-    return SurfaceEngine(airport, radars, nodes, tracker, monitor, clock)
+    return SurfaceEngine(airport, radars, nodes, tracker, monitor, clock, _most_ahead(settings))
+
+
+def _most_ahead(settings: Settings) -> float:
+    """How far after its arrival anything may be dated: more than the clock of any source is allowed to be off, s."""
+    clocks = (settings.clocks.reports, settings.clocks.nodes, *(one.clock for one in settings.radars))
+    return max(one.max_offset_s for one in clocks) + AHEAD_MARGIN_S
 
 
 def check_parts(settings: Settings) -> None:

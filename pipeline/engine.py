@@ -142,7 +142,8 @@ class SurfaceEngine:
     """Holds the tracker and the alert monitor and makes pictures of them.
 
     airport, radars, nodes: where things are; a table's `radar` and `node` columns are indices into these.
-    clock: seconds of any steady clock, injected so that stages can be timed; None: nothing is timed.
+    clock: seconds of any steady clock, injected so that stages can be timed; None: nothing is timed. most_ahead_s:
+    what is dated further after its arrival is refused.
     The engine's time is the newest that it accepted; it moves on with ticks when the sensors are silent, and never
     runs back but for a ClockStep.
     """
@@ -155,6 +156,7 @@ class SurfaceEngine:
         tracker: TrackerLike,
         monitor: MonitorLike,
         clock: Callable[[], float] | None = None,
+        most_ahead_s: float = MOST_AHEAD_S,
     ) -> None:
         self.airport = airport
         self.radars = tuple(radars)
@@ -163,6 +165,7 @@ class SurfaceEngine:
         self.monitor = monitor
         self.timings: dict[str, float] = {}
         self._clock = clock
+        self._most_ahead_s = most_ahead_s
         self._state = EngineState()
 
     @property
@@ -276,14 +279,14 @@ class SurfaceEngine:
         self._state = EngineState(s.time, s.heard, s.looked, s.degraded, list(s.new_node_events), dict(s.refused))
 
     def _sector_in_time(self, sector: SectorPlots, arrival: float) -> bool:
-        ahead = sector.time > arrival + MOST_AHEAD_S
+        ahead = sector.time > arrival + self._most_ahead_s
         if ahead:
             self._refuse("sector_ahead", 1)
         return not ahead
 
     def _in_time(self, table: Any, arrival: float, kind: str) -> Any:
         """The rows that are not dated after their arrival; the others are counted."""
-        ahead = table.time > arrival + MOST_AHEAD_S
+        ahead = table.time > arrival + self._most_ahead_s
         self._refuse(f"{kind}_ahead", int(ahead.sum()))
         return table[~ahead] if ahead.any() else table
 
