@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path
 from starlette.responses import Response
 
-from app.api import models
+from app.api import part_models
 from app.api.context import Context, answer, problems
 from app.api.problems import ApiProblem
 from app.contract import FrontEnd, WrongParts
@@ -26,17 +26,17 @@ def parts_router(context: Context) -> APIRouter:
         available = {verb: [asdict(one) for one in catalogue.methods(verb)] for verb in state.running}
         return answer({"mode": mode, **asdict(state), "available": available})
 
-    @router.get("/radars/{id}/parts", response_model=models.RadarParts, responses=problems(404, 422, 503))
+    @router.get("/radars/{id}/parts", response_model=part_models.RadarParts, responses=problems(404, 422, 503))
     def parts(id: RadarId) -> Response:
         """The parts that work on a radar's video with all their settings, their cost, and what else there is."""
         return told(context.ask(lambda: service.front_end(id)))
 
     @router.put(
         "/radars/{id}/parts",
-        response_model=models.RadarParts,
+        response_model=part_models.RadarParts,
         responses=problems(400, 403, 404, 409, 413, 422, 503),
     )
-    def choose(id: RadarId, order: models.PartsOrder) -> Response:
+    def choose(id: RadarId, order: part_models.PartsOrder) -> Response:
         """Have other parts work on a radar's video, without a break in the picture.
 
         The new parts are built and compiled beside the old ones, which may take a while the first time. A detector that
@@ -54,5 +54,5 @@ def parts_router(context: Context) -> APIRouter:
     return router
 
 
-def _choice(one: models.PartChoice | str) -> dict[str, Any]:
+def _choice(one: part_models.PartChoice | str) -> dict[str, Any]:
     return {"name": one} if isinstance(one, str) else {"name": one.name, **(one.model_extra or {})}

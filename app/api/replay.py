@@ -12,7 +12,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response
 
-from app.api import models
+from app.api import replay_models
 from app.api.context import Context, answer, instant, problems
 from app.api.intake import JSON, json_body
 from app.api.problems import ApiProblem
@@ -32,16 +32,16 @@ def replay_router(context: Context) -> APIRouter:
     def told(state: ReplayState) -> Response:
         return answer({"mode": mode, **asdict(state)})
 
-    @router.get("/replay", response_model=models.Replay, responses=problems(404))
+    @router.get("/replay", response_model=replay_models.Replay, responses=problems(404))
     def replay() -> Response:
         """Which recording is shown, where it stands, and how fast it goes. 404 when nothing is replayed."""
         return told(control().state())
 
-    body = {"content": {JSON: {"schema": models.ReplayOrder.model_json_schema()}}, "required": True}
+    body = {"content": {JSON: {"schema": replay_models.ReplayOrder.model_json_schema()}}, "required": True}
 
     @router.put(
         "/replay",
-        response_model=models.Replay,
+        response_model=replay_models.Replay,
         responses=problems(403, 404, 413, 415, 422),
         openapi_extra={"requestBody": body},
     )
@@ -62,7 +62,7 @@ def replay_router(context: Context) -> APIRouter:
 def _wanted(body: bytes) -> dict[str, Any]:
     """What the order asks for. Raises RequestValidationError or ApiProblem."""
     try:
-        order = models.ReplayOrder.model_validate_json(body)
+        order = replay_models.ReplayOrder.model_validate_json(body)
     except ValidationError as error:
         faults = [{**one, "loc": ("body", *one["loc"])} for one in error.errors()]
         raise RequestValidationError(faults) from error
