@@ -123,7 +123,7 @@ class MaximumLikelihood:
         prior = (math.nan, math.inf) if expected is None else (expected.heading, max(expected.sd, 1e-3))
         _search(
             read_only(view.amplitude), grid, (echo.east, echo.north, echo.azimuth, echo.background),
-            (db_per_step, self.limit_db, self.sharpness * echo.parts, *prior, self.outliers),
+            (db_per_step, self.limit_db, self.sharpness * echo.resolution_cells, *prior, self.outliers),
             state.steps, state.coarse[ring], state.fine[ring], modes,
         )  # fmt: skip
         return self._judged(modes, expected)
@@ -185,7 +185,7 @@ def _halved(picture: Any, out: Any) -> float:
 def _search(amplitude: Any, grid: Any, place: Any, rule: Any, steps: Any, coarse: Any, fine: Any, modes: Any) -> None:
     """The best headings, finely. modes: (n, 3) heading (rad from north), log likelihood, variance (rad^2)."""
     east, north, azimuth, background = place
-    db_per_step, limit, parts = rule[0], rule[1], rule[2]
+    db_per_step, limit, resolution_cells = rule[0], rule[1], rule[2]
     prior = (rule[3], rule[4], rule[5])
     sizes, angles = fine.shape[0], fine.shape[1]
     turn = 2 * np.pi / angles
@@ -211,7 +211,7 @@ def _search(amplitude: Any, grid: Any, place: Any, rule: Any, steps: Any, coarse
                     if value > best:
                         best, best_down, best_right = value, down, right
             left = max(1.0 - 4.0 * best * best * steps[k] ** 2 / whole_small, 1e-6)
-            score = -0.5 * parts * np.log(left) + belief(azimuth + COARSE * a * turn, prior)
+            score = -0.5 * resolution_cells * np.log(left) + belief(azimuth + COARSE * a * turn, prior)
             if score > scores[a]:
                 scores[a] = score
                 where[a, 0], where[a, 1], where[a, 2] = k, best_down, best_right
@@ -225,7 +225,7 @@ def _search(amplitude: Any, grid: Any, place: Any, rule: Any, steps: Any, coarse
             scores[(a + near) % tries] = -np.inf
         _refine(
             pictures[where[a, 0]], fine[where[a, 0]], COARSE * a, 2 * where[a, 1], 2 * where[a, 2],
-            (azimuth, whole / steps[where[a, 0]] ** 2, parts), prior, likely, modes[mode],
+            (azimuth, whole / steps[where[a, 0]] ** 2, resolution_cells), prior, likely, modes[mode],
         )  # fmt: skip
 
 
@@ -234,7 +234,7 @@ def _refine(
     picture: Any, bank: Any, middle: int, down: int, right: int, scene: Any, prior: Any, likely: Any, mode: Any
 ) -> None:
     """Look at all templates and places about a coarse one; the peak of the parabola through the best three."""
-    azimuth, whole, parts = scene
+    azimuth, whole, resolution_cells = scene
     angles = bank.shape[0]
     turn = 2 * np.pi / angles
     reach = likely.size // 2
@@ -245,7 +245,7 @@ def _refine(
             for j in range(max(right - 1, 0), min(right + 1, 2 * SHIFT) + 1):
                 best = max(best, fit(picture, template, i, j))
         left = max(1.0 - best * best / whole, 1e-6)
-        likely[a + reach] = -0.5 * parts * np.log(left) + belief(azimuth + (middle + a) * turn, prior)
+        likely[a + reach] = -0.5 * resolution_cells * np.log(left) + belief(azimuth + (middle + a) * turn, prior)
     at = min(max(np.argmax(likely), 1), likely.size - 2)
     before, here, after = likely[at - 1], likely[at], likely[at + 1]
     bend = max(2 * here - before - after, 1e-9)

@@ -19,19 +19,19 @@ from pipeline.sites import RadarSite
 @dataclass(frozen=True)
 class Moments:
     """weighted: cells weigh by their decibels over the ground, instead of alike. cell_db: over the median of the
-    ground, from which on a cell counts. least_parts: echoes of fewer resolution cells get no bearing. floor_deg:
-    standard deviation that remains with very many cells. limit_deg: bearings less sure are not given.
+    ground, from which on a cell counts. least_resolution_cells: echoes of fewer resolution cells get no bearing.
+    floor_deg: standard deviation that remains with very many cells. limit_deg: bearings less sure are not given.
     """
 
     weighted: bool = False
     cell_db: float = 12.0
-    least_parts: float = 8.0
+    least_resolution_cells: float = 8.0
     floor_deg: float = 3.5
     limit_deg: float = 20.0
 
     def __post_init__(self) -> None:
-        if min(self.cell_db, self.least_parts, self.floor_deg, self.limit_deg) <= 0:
-            raise ValueError("cell_db, least_parts, floor_deg and limit_deg must be above 0")
+        if min(self.cell_db, self.least_resolution_cells, self.floor_deg, self.limit_deg) <= 0:
+            raise ValueError("cell_db, least_resolution_cells, floor_deg and limit_deg must be above 0")
 
     def start(self, site: RadarSite) -> RadarSite:
         """Nothing but the radar itself is needed."""
@@ -49,13 +49,13 @@ class Moments:
             video.db_per_step,
             weighted=self.weighted,
         )
-        if echo is None or echo.parts < self.least_parts:
+        if echo is None or echo.resolution_cells < self.least_resolution_cells:
             return NO_BEARING
         axis, major, minor = echo.axis
         minor = max(minor, video.range_step_m**2 / 12)
         if major <= minor:
             return NO_BEARING
-        spread = major * minor / (echo.parts * (major - minor) ** 2)
+        spread = major * minor / (echo.resolution_cells * (major - minor) ** 2)
         sd = math.sqrt(spread + math.radians(self.floor_deg) ** 2)
         return pointed(axis, sd, expected, math.radians(self.limit_deg))
 

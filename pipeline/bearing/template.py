@@ -61,7 +61,7 @@ class Template:
         if echo is None or echo.cells < self.least_cells:
             return NO_BEARING
         fit = state.correlations(view, echo, np.arange(ANGLES))
-        likely = -0.5 * self.sharpness * echo.parts * np.log(1 - fit)
+        likely = -0.5 * self.sharpness * echo.resolution_cells * np.log(1 - fit)
         heading = echo.azimuth + np.arange(ANGLES) * (TURN / ANGLES)
         if expected is not None:
             prior = (expected.heading, max(expected.sd, 1e-3), self.outliers)

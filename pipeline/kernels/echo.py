@@ -24,13 +24,13 @@ class Echo:
     """What was measured.
 
     background: median amplitude of the ground about the plot, of its brighter part when it is mixed. cells: those of
-    the plot that stand out of it. parts: resolution cells that they fill. east, north: m from the radar, their middle.
+    the plot that stand out of it. resolution_cells: so many they fill. east, north: m from the radar, their middle.
     cxx, cxy, cyy: m^2, their covariance (xx: east), the beam's width taken out.
     """
 
     background: float
     cells: int
-    parts: float
+    resolution_cells: float
     east: float
     north: float
     cxx: float

@@ -53,7 +53,7 @@ def templates(
 
 
 def _corners(shape: Planform) -> Floats:
-    """(parts, 6): each part between two ends across: distance across, nose and back of the inner and the outer end."""
+    """(pieces, 6): each piece between two ends across: distance across, nose and back of inner and outer end."""
     half, body, span = shape.length / 2, shape.fuselage / 2, shape.span / 2
     slope = math.tan(shape.sweep)
 
@@ -74,14 +74,14 @@ def _corners(shape: Planform) -> Floats:
 
 
 @allocating
-def _inside(forward: float, right: float, parts: Floats) -> bool:
+def _inside(forward: float, right: float, pieces: Floats) -> bool:
     across = abs(right)
-    for k in range(parts.shape[0]):
-        inner, outer = parts[k, 0], parts[k, 3]
+    for k in range(pieces.shape[0]):
+        inner, outer = pieces[k, 0], pieces[k, 3]
         if inner <= across < outer:
             u = (across - inner) / (outer - inner)
-            nose = parts[k, 1] + u * (parts[k, 4] - parts[k, 1])
-            back = parts[k, 2] + u * (parts[k, 5] - parts[k, 2])
+            nose = pieces[k, 1] + u * (pieces[k, 4] - pieces[k, 1])
+            back = pieces[k, 2] + u * (pieces[k, 5] - pieces[k, 2])
             if back <= forward <= nose:
                 return True
     return False
@@ -95,13 +95,13 @@ def _weights(sigma: float, step: float) -> Any:
 
 
 @allocating
-def _templates(parts: Floats, step: float, deep_sigma: float, sigmas: Floats, contrast: float, out: Templates) -> None:
+def _templates(pieces: Floats, step: float, deep_sigma: float, sigmas: Floats, contrast: float, out: Templates) -> None:
     count, pixels = out.shape[1], out.shape[2]
     deep = _weights(deep_sigma, step)
     reach = len(deep) // 2
     sharp, blurred = np.empty((pixels, pixels)), np.empty((pixels, pixels))
     for a in range(count):
-        _rasterise(parts, step, 2 * np.pi * a / count, sharp)
+        _rasterise(pieces, step, 2 * np.pi * a / count, sharp)
         for i in range(pixels):
             for j in range(pixels):
                 total = 0.0
@@ -113,7 +113,7 @@ def _templates(parts: Floats, step: float, deep_sigma: float, sigmas: Floats, co
 
 
 @allocating
-def _rasterise(parts: Floats, step: float, heading: float, out: Floats) -> None:
+def _rasterise(pieces: Floats, step: float, heading: float, out: Floats) -> None:
     """Part of each pixel that the outline covers, by nine points."""
     sine, cosine = np.sin(heading), np.cos(heading)
     pixels = out.shape[0]
@@ -124,7 +124,7 @@ def _rasterise(parts: Floats, step: float, heading: float, out: Floats) -> None:
                 away = ((pixels - 1) / 2 - i + p / 3) * step
                 for q in range(-1, 2):
                     right = (j - (pixels - 1) / 2 + q / 3) * step
-                    if _inside(away * cosine + right * sine, right * cosine - away * sine, parts):
+                    if _inside(away * cosine + right * sine, right * cosine - away * sine, pieces):
                         hits += 1
             out[i, j] = hits / 9
 
