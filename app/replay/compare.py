@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from app.journal.names import JournalError
 from app.journal.reader import Journal, Record
-from app.replay.recorded import RecordedRun, changed
+from app.replay.recorded import RecordedRun, changed, own_verbs
 from app.replay.verify import ReplayEngine
 from pipeline.engine_records import SNAPSHOT, SWEEPS
 from pipeline.lab.measure.compare_pictures import PictureComparison
@@ -29,7 +29,7 @@ def compare(
     def change(run: RecordedRun) -> RecordedRun:
         return changed(run, orders, sweeps=sweeps)
 
-    replay, made = ReplayEngine(journal, change), PictureComparison()
+    replay, made = ReplayEngine(journal, change, own_verbs(orders)), PictureComparison()
     for one in replay.replayed(since, until):
         if isinstance(one, Record):
             if one.topic == SNAPSHOT and replay.lost:
