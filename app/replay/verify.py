@@ -90,7 +90,10 @@ class ReplayEngine:
         """No state to go on from: at the begin, and after a gap, up to the next snapshot."""
 
     def replayed(self, since: float | None = None, until: float | None = None) -> Iterator[Replayed | Record]:
-        """Every input with both outcomes, and every other record as it stands, in order. Raises JournalError."""
+        """Every input with both outcomes, and every other record as it stands, in order.
+
+        Raises JournalError."""
+        self.journal.first_snapshot()
         waiting: tuple[Record, Envelope, Shown | None] | None = None
         for record in self.journal.records(since):
             if until is not None and record.time > until:
