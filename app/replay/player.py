@@ -158,11 +158,11 @@ class JournalPlayer:
             target, self._wanted.time = self._wanted.time, None
         target = self._time if target is None else target
         self.failed = ""
-        pace = _Pace(target)
+        pace, there = _Pace(target), False
         for shown, changes, at in self._shown(target):
-            if not self._wait_until(at, pace):
+            if there and not self._wait_until(at, pace):
                 return
-            self._time = at
+            self._time, there = at, True  # the first picture is shown at once, also when it stands still
             self._publish(shown, changes)
         with self._condition:
             if self._asked_elsewhere():

@@ -96,7 +96,8 @@ class Recording:
 
     def overflow(self, envelopes: Iterable[Envelope]) -> None:
         """These find the queue full."""
-        limits = self.writer._limits
+        taken, limits = self.writer.snapshots_taken, self.writer._limits
+        until(lambda: self.writer.state().counters.snapshots == taken, "the snapshots are written")
         self.writer._limits = replace(limits, queue_records=0)
         self.feed(envelopes)
         self.writer._limits = limits
