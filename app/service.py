@@ -294,7 +294,7 @@ class SurfaceService:
             return
         coming = expected_headings(picture.tracks, picture.time)
         for worker in list(self._workers.values()):
-            worker.chain.expect(coming.east, coming.north, coming.heading, coming.sd)
+            worker.expect(coming.east, coming.north, coming.heading, coming.sd)
 
     def _stage_timings(self) -> dict[str, float]:
         return {

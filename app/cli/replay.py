@@ -80,9 +80,10 @@ def replay(
     from app.replay.command import is_journal
 
     console = Console()
-    if is_journal(file):
+    asked = verify or begin or until or change
+    if is_journal(file) or (asked and file.is_dir()):
         _replay_journal(console, file, speed, headless, verify, (begin, until), tuple(change or ()), http_port)
-    elif verify or begin or until or change:
+    elif asked:
         raise fail(f"{file}: --verify, --from, --until and --set are for journals (.mcap)")
     else:
         _replay_video(console, file, speed, headless, (radar, to), loop, port, settings)

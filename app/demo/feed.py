@@ -81,6 +81,12 @@ class VideoChannel:
         self.next_message = (self.next_message + len(lengths)) % 2**32
         return datagrams, lengths
 
+    def load(self) -> None:
+        """Make one sector for nobody: loading the kernels would make the first one that is sent seconds late."""
+        before = self.next_message
+        self.sector(0)
+        self.next_message = before
+
 
 class DemoFeed:
     """Sends video to the radar's port and submits events and reports, each when its time has come.
@@ -152,6 +158,7 @@ class DemoFeed:
 
     def _play(self, sender: DatagramSender) -> None:
         period = self._channel.video.site.video.period_s / SECTORS
+        self._channel.load()
         # the world began when it was made: what has passed since is over
         behind = time.time() - self.world.start if self.speed == 1.0 else 0.0
         begun = self._clock() - max(behind, 0.0)

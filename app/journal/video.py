@@ -48,7 +48,13 @@ class VideoRecorder:
         same = self._expected is not None and np.array_equal(expected, self._expected)
         self._expected = expected
         # the receiver may use the memory of the block again
-        kept = replace(block, amplitude=block.amplitude.copy())
+        kept = replace(
+            block,
+            amplitude=block.amplitude.copy(),
+            row=block.row.copy(),
+            azimuth=block.azimuth.copy(),
+            time=block.time.copy(),
+        )
         self._writer.put(
             SWEEPS,
             now,

@@ -20,8 +20,11 @@ from pipeline.tables import Tracks
 
 
 def is_journal(path: Path) -> bool:
-    """A journal file by its name, or a folder that holds journal files."""
-    return path.suffix == ".mcap" or (path.is_dir() and bool(journal_files(path)))
+    """A journal file by its name, or a folder that holds journal files or cannot be looked into."""
+    try:
+        return path.suffix == ".mcap" or (path.is_dir() and bool(journal_files(path)))
+    except OSError:
+        return True  # opening it then says what is wrong
 
 
 class JournalReplay:

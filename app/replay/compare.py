@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from app.journal.names import JournalError
 from app.journal.reader import Journal, Record
-from app.replay.recorded import VIDEO_PARTS, RecordedRun, changed
+from app.replay.recorded import RecordedRun, changed, own_verbs
 from app.replay.verify import ReplayEngine
 from pipeline.engine_records import SNAPSHOT, SWEEPS
 from pipeline.lab.measure.compare_pictures import PictureComparison
@@ -25,12 +25,11 @@ def compare(
     Raises JournalError when the journal cannot be used, SettingsError for an order that cannot change anything.
     """
     sweeps = SWEEPS in journal.topics()
-    own = frozenset(verb for verb in VIDEO_PARTS if any(order.startswith(f"parts.{verb}") for order in orders))
 
     def change(run: RecordedRun) -> RecordedRun:
         return changed(run, orders, sweeps=sweeps)
 
-    replay, made = ReplayEngine(journal, change, own), PictureComparison()
+    replay, made = ReplayEngine(journal, change, own_verbs(orders)), PictureComparison()
     for one in replay.replayed(since, until):
         if isinstance(one, Record):
             if one.topic == SNAPSHOT and replay.lost:

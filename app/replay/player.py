@@ -26,8 +26,8 @@ SLOWEST, FASTEST = 0.1, 64.0
 STILL_S = 0.5
 """While it stands still the picture is sent again this often, so that displays know that it is all there is."""
 
-HOLE_S = 3.0
-"""A hole in the recording longer than this is passed over at once: nobody waits before an old picture."""
+LONGEST_PAUSE_S = 3.0
+"""A longer time without any record is skipped: no service ran, or its clock was set. Ticks come every 0.25 s."""
 
 CATCH_UP_S = 1.0
 """When the engine cannot keep the pace, what it is behind by more than this is forgiven."""
@@ -46,7 +46,7 @@ class JournalPlayer:
     """Steers and runs the replay of one journal in a thread of its own. All public methods: from any thread.
 
     change: other settings. window: from, until; UTC s of the recording, None for its begin and end.
-    begin_anew: called after a seek, before the first picture of the new place.
+    begin_anew: called after a seek, before the first picture of the new place. own: see `ReplayEngine`.
     """
 
     def __init__(
@@ -56,6 +56,7 @@ class JournalPlayer:
         window: tuple[float | None, float | None],
         speed: float = 1.0,
         begin_anew: Callable[[], None] = lambda: None,
+        own: frozenset[str] = frozenset(),
     ) -> None:
         first, last = journal.first_time(), journal.last_time()
         if first is None or last is None:
@@ -68,7 +69,7 @@ class JournalPlayer:
         self.newest: Picture | None = None
         self.begin_anew = begin_anew
         self.failed = ""
-        self._change = change
+        self._change, self._own = change, own
         self._wanted = _Wanted(True, _speed(speed), self.begin)
         self._condition = threading.Condition()
         self._listeners: list[PictureListener] = []
@@ -133,7 +134,7 @@ class JournalPlayer:
                 wanted.speed = _speed(speed)
             if time is not None:
                 wanted.time = time
-            elif playing and self._time >= self.end:
+            elif playing and (self.failed or self._time >= self.end):
                 wanted.time = self.begin
             self._condition.notify_all()
         return self.state()
@@ -142,9 +143,13 @@ class JournalPlayer:
         while not self._ending:
             try:
                 self._play()
-            except JournalError as error:
-                self.failed = str(error)
+            except Exception as error:
+                if not isinstance(error, JournalError):
+                    log.exception("the replay failed")
+                self.failed = str(error) or type(error).__name__
                 log.error("the replay stands still: %s", error)
+                with self._condition:
+                    self._wanted.playing = False
                 self._stand_still()
 
     def _play(self) -> None:
@@ -152,21 +157,24 @@ class JournalPlayer:
         with self._condition:
             target, self._wanted.time = self._wanted.time, None
         target = self._time if target is None else target
-        pace = _Pace(target)
+        self.failed = ""
+        pace, there = _Pace(target), False
         for shown, changes, at in self._shown(target):
-            if not self._wait_until(at, pace):
+            if there and not self._wait_until(at, pace):
                 return
-            self._time = at
+            self._time, there = at, True  # the first picture is shown at once, also when it stands still
             self._publish(shown, changes)
-        self._time = self.end
         with self._condition:
+            if self._asked_elsewhere():
+                return
+            self._time = self.end
             self._wanted.playing = False
         self._stand_still()
 
     def _shown(self, target: float) -> Iterator[tuple[Shown, tuple[AlertChange, ...], float]]:
         """The picture at `target` at once, then all that follow; fast forward from the snapshot before it."""
         self._sensors = ()
-        replay = ReplayEngine(self.journal, self._change)
+        replay = ReplayEngine(self.journal, self._change, self._own)
         newest: Shown | None = None
         reached = False
         for one in replay.replayed(max(target, self.journal.first_snapshot()), self.end):
@@ -218,15 +226,13 @@ class JournalPlayer:
                 if self._ending or self._wanted.time is not None:
                     return False
                 if self._wanted.playing:
-                    if at - self._time > HOLE_S:
-                        pace.stand(at)
                     pause = pace.pause(at, self._wanted.speed)
                     if pause <= 0.0:
                         return True
                     self._condition.wait(pause)
                     continue
-            pace.stand(self._time)
             self._again(STILL_S)
+            pace.stand(self._time)
 
     def _stand_still(self) -> None:
         while not self._asked_elsewhere():
@@ -247,7 +253,7 @@ class _Pace:
     """When the recording reaches what time, on this host's steady clock."""
 
     def __init__(self, at: float) -> None:
-        self._recorded, self._steady, self._speed = at, clocks.monotonic(), 0.0
+        self._recorded, self._steady, self._speed, self._newest = at, clocks.monotonic(), 0.0, at
 
     def stand(self, at: float) -> None:
         """It stands still at this time of the recording."""
@@ -261,6 +267,9 @@ class _Pace:
                 self._recorded += (now - self._steady) * self._speed
                 self._steady = now
             self._speed = speed
+        if at - self._newest > LONGEST_PAUSE_S:
+            self._recorded += at - self._newest
+        self._newest = at
         due = self._steady + (at - self._recorded) / speed
         if now - due > CATCH_UP_S:
             self._recorded, self._steady = at, now

@@ -98,6 +98,12 @@ def changed(run: RecordedRun, orders: Sequence[str], *, sweeps: bool) -> Recorde
     return RecordedRun(document, settings, run.airport, run.geojson, run.versions)
 
 
+def own_verbs(orders: Sequence[str]) -> frozenset[str]:
+    """The verbs of the radars' chains whose parts these orders change."""
+    named = {one.partition("=")[0].strip().removeprefix("parts.").partition(".")[0] for one in orders}
+    return frozenset(VIDEO_PARTS) & named
+
+
 def _settings(document: dict[str, Any]) -> Settings:
     made = RecordedSettings(**document)
     return made.model_copy(update={"mode": "replay", "data_dir": Path(made.data_dir)})
@@ -119,10 +125,17 @@ def _must_matter(path: list[str], sweeps: bool) -> None:
 
 def _put(document: dict[str, Any], path: list[str], value: Any) -> None:
     """Set a value. A part that is named anew loses the settings of the part before."""
-    inner = document
-    for step in path[:-1]:
-        inner = inner[step] if isinstance(inner.get(step), dict) else inner.setdefault(step, {})
-    inner[path[-1]] = value
+    verb, parts = path[1], document.setdefault("parts", {})
+    if len(path) == 2:
+        parts[verb] = value
+        return
+    part = parts.get(verb, {})
+    part = {"name": part} if isinstance(part, str) else part
+    if len(path) > 3 or not path[2] or not isinstance(part, dict):
+        whole = f"parts.{verb}=[...] sets them as a whole" if isinstance(part, list | tuple) else "there is none such"
+        raise SettingsError(f"--set {'.'.join(path)}: {whole}")
+    anew = path[2] == "name" and value != part.get("name")
+    parts[verb] = {"name": value} if anew else {**part, path[2]: value}
 
 
 def _value(text: str) -> Any:

@@ -13,7 +13,7 @@ from app.journal.names import JournalError
 from app.journal.reader import Journal
 from app.live.hub import Hub
 from app.replay.player import JournalPlayer
-from app.replay.recorded import RecordedRun, changed, recorded_run
+from app.replay.recorded import RecordedRun, changed, own_verbs, recorded_run
 from app.replay.service import ReplayService
 from app.run import serve
 from pipeline.engine_records import SWEEPS
@@ -43,7 +43,7 @@ class ReplayRunning:
             raise JournalError(f"{journal.name}: no settings and no map in it")
         run = change(recorded_run(attached, journal.name))
         self.settings = run.settings.model_copy(update={"port": port, "host": "127.0.0.1", "mode": "replay"})
-        player = JournalPlayer(journal, change, window, speed)
+        player = JournalPlayer(journal, change, window, speed, own=own_verbs(orders))
         self.service = ReplayService(
             RecordedRun(run.document, self.settings, run.airport, run.geojson, run.versions), player
         )

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
+from typing import TypeVar
 
 from app.journal.names import GAP, SNAPSHOT, JournalError
 from app.journal.reader import Journal, Record
@@ -19,6 +20,7 @@ from pipeline.values import first_difference
 
 log = logging.getLogger(__name__)
 
+T = TypeVar("T")
 SEQUENCE_MODULO = 2**32
 
 
@@ -88,14 +90,17 @@ class ReplayEngine:
         """No state to go on from: at the begin, and after a gap, up to the next snapshot."""
 
     def replayed(self, since: float | None = None, until: float | None = None) -> Iterator[Replayed | Record]:
-        """Every input with both outcomes, and every other record as it stands, in order. Raises JournalError."""
+        """Every input with both outcomes, and every other record as it stands, in order.
+
+        Raises JournalError."""
+        self.journal.first_snapshot()
         waiting: tuple[Record, Envelope, Shown | None] | None = None
         for record in self.journal.records(since):
             if until is not None and record.time > until:
                 break
             self._follow(record)
             if record.topic == OUTPUT and waiting is not None and not self._lost:
-                recorded = CODEC.decode(record.data)
+                recorded = self._decoded(record, Shown)
                 yield Replayed(waiting[0], waiting[1], recorded, waiting[2], record.data)
                 waiting = None
                 continue
@@ -151,6 +156,17 @@ class ReplayEngine:
         if not self._lost:
             self.counts.gaps += 1
         self._lost = True
+        if self.video is not None:
+            self.video.forget()
+
+    def _decoded(self, record: Record, kind: type[T]) -> T:
+        try:
+            made = CODEC.decode(record.data)
+            if not isinstance(made, kind):
+                raise ValueError(f"it is a {type(made).__name__}, where a {kind.__name__} is wanted")
+        except ValueError as error:
+            raise JournalError(f"{self.journal.name}: the {record.topic} at {told(record.time)}: {error}") from error
+        return made
 
     def _begin_run(self, id: str) -> None:
         self._id, self._lost, self._sequence = id, True, None
@@ -163,10 +179,7 @@ class ReplayEngine:
 
     def _step(self, record: Record) -> tuple[Record, Envelope, Shown | None]:
         assert self.engine is not None
-        try:
-            envelope = CODEC.decode(record.data)
-        except ValueError as error:
-            raise JournalError(f"{self.journal.name}: the input at {told(record.time)}: {error}") from error
+        envelope = self._decoded(record, Envelope)
         self.counts.inputs += 1
         if isinstance(envelope.body, SectorPlots):
             envelope = self._detected_again(record, envelope, envelope.body)

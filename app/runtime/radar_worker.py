@@ -11,6 +11,8 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+from numpy.typing import ArrayLike
+
 from app.runtime.cuts import Cuts
 from app.runtime.queues import BlockQueue, Closed
 from pipeline.chain import RadarChain
@@ -73,6 +75,8 @@ class RadarWorker:
         self._turning = Turn()
         self._successor: Successor | None = None
         self._orders: deque[Callable[[], None]] = deque()
+        self._expected: tuple[ArrayLike, ...] | None = None
+        self._given: tuple[ArrayLike, ...] | None = None
         self._thread = threading.Thread(target=self._run, name=f"radar-{site.id}", daemon=True)
 
     def start(self) -> None:
@@ -83,6 +87,10 @@ class RadarWorker:
         """Take a block; never waits."""
         self.last_heard = time.monotonic()
         self.queue.put(block)
+
+    def expect(self, east: ArrayLike, north: ArrayLike, heading: ArrayLike, sd: ArrayLike) -> None:
+        """What tracks expect of the blocks to come (`RadarChain.expect`); never waits. Of several the newest counts."""
+        self._expected = (east, north, heading, sd)
 
     def stop(self) -> None:
         """End, leaving what waits."""
@@ -172,7 +180,8 @@ class RadarWorker:
     def _work(self, block: Sweeps) -> None:
         self._attempt(lambda: self._bring_up(block))
         try:
-            self._record(self.chain, block)
+            self._give_expected()
+            self._recorded(block)
             sector = self.chain.process(block)
         except Exception:
             self.failures += 1
@@ -182,6 +191,20 @@ class RadarWorker:
             self.last_time = float(block.time[-1])
         self._account(block.scan, sector)
         self._hand_on(sector)
+
+    def _recorded(self, block: Sweeps) -> None:
+        try:
+            self._record(self.chain, block)
+        except Exception:
+            self.failures += 1
+            log.exception("radar %s: a block of scan %d could not be recorded", self.site.id, block.scan)
+
+    def _give_expected(self) -> None:
+        """Between two blocks only: what is recorded of it must be what the whole block is worked on with."""
+        expected = self._expected
+        if expected is not None and expected is not self._given:
+            self._given = expected
+            self.chain.expect(*expected)
 
     def _attempt(self, work: Callable[[], Any]) -> None:
         try:
@@ -218,6 +241,7 @@ class RadarWorker:
             self._hand_on(self.chain.flush())
         successor.chain.take_over(self.chain)
         self.chain = successor.chain
+        self._given = None
         self.successions += 1
         self._successor, self.scans_left = None, None
         successor.done(True)

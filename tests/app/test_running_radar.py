@@ -130,7 +130,9 @@ def test_tracks_tell_the_radar_how_their_targets_point(radar: Radar) -> None:
     told: list[Any] = []
     radar.service._workers["smr-1"].chain.expect = lambda *columns: told.append(columns)  # type: ignore[method-assign]
     radar.turns(1)
-    until(lambda: len(told) > 0, "a picture tells what to expect")
+    until(lambda: radar.service._workers["smr-1"]._expected is not None, "a picture tells what to expect")
+    radar.turns(1)
+    assert told
     assert all(len(columns) == 4 for columns in told)
 
 

@@ -66,3 +66,28 @@ def as_geojson(airport: Airport) -> dict[str, Any]:
             for one in airport.features
         ],
     }
+
+
+def as_document(airport: Airport) -> dict[str, Any]:
+    """The whole map, like a shipped one: `airport_from_geojson` reads the runways and holding positions from it."""
+
+    def feature(id: str, kind: str, geometry: Any, **properties: Any) -> dict[str, Any]:
+        there = transform(geometry, lambda points: np.column_stack(airport.frame.to_geodetic(*points.T)[::-1]))
+        return {"type": "Feature", "id": id, "properties": {"kind": kind, **properties}, "geometry": mapping(there)}
+
+    made = []
+    for one in airport.features:
+        runway = next((it for it in airport.runways if it.id == one.name), None)
+        words = {"runway": runway.id, "designators": [it.designator for it in runway.ends]} if runway else {}
+        made.append(feature(one.id, one.kind, one.geometry, name=one.name, **words))
+    for runway in airport.runways:
+        made.append(feature(f"line-{runway.id}", "PaintedCenterline", runway.centreline, runway=runway.id))
+        for end in runway.ends:
+            words = {"runway": runway.id, "designator": end.designator}
+            made.append(feature(f"threshold-{end.designator}", "RunwayThreshold", end.threshold, **words))
+    for hold in airport.holding_positions:
+        words = {"name": hold.name, "runway": hold.runway, "heading_deg": math.degrees(hold.heading)}
+        made.append(feature(hold.id, "TaxiwayHoldingPosition", hold.line, **words))
+    reference = {"latitude": airport.frame.latitude, "longitude": airport.frame.longitude}
+    return {"type": "FeatureCollection", "icao": airport.icao, "name": airport.name, "reference": reference,
+            "features": made}  # fmt: skip

@@ -22,9 +22,9 @@ def small_site(**values: Any) -> RadarSite:
     return RadarSite(**{"id": "smr-1", "east": 0.0, "north": 0.0, "height": 20.0, "video": VIDEO, **values})
 
 
-def small_chain(detector: Any = None, extractor: Any = None, **values: Any) -> RadarChain:
+def small_chain(detector: Any = None, extractor: Any = None, bearing: Any = None, **values: Any) -> RadarChain:
     """A chain whose kernels are compiled before anybody waits for its thread."""
-    made = RadarChain(small_site(**values), 0, detector or Hybrid(), extractor or Manhattan())
+    made = RadarChain(small_site(**values), 0, detector or Hybrid(), extractor or Manhattan(), bearing=bearing)
     made.warm()
     return made
 

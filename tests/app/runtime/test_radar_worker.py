@@ -6,14 +6,16 @@ import threading
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 
 from app.runtime.radar_worker import RadarWorker
+from pipeline.bearing.moments import Moments
 from pipeline.chain import RadarChain
 from pipeline.detect.adaptive import Adaptive
 from pipeline.detect.hybrid import Hybrid
 from pipeline.extract.manhattan import Manhattan
-from pipeline.tables import SectorPlots
+from pipeline.tables import SectorPlots, Sweeps
 from tests.app.runtime.small_radar import AZIMUTHS, BLOCKS, T0, small_chain, turn
 from tests.support.running import until
 
@@ -158,3 +160,78 @@ def test_a_flood_degrades_the_radar_until_it_is_over() -> None:
         assert running.worker.cuts.words() == ""
     finally:
         running.worker.stop()
+
+
+class Watched:
+    """A worker of which every record is kept, with a chain that others may interrupt while it works."""
+
+    def __init__(self) -> None:
+        self.events: list[str] = []
+        self.during: Any = lambda: None
+        chain = small_chain(bearing=Moments())
+        work = chain.process
+
+        def process(block: Sweeps) -> SectorPlots:
+            self.events.append(f"work {block.row[0]} {chain.expected.shape[1]}")
+            self.during()
+            made = work(block)
+            self.events.append(f"done {block.row[0]} {chain.expected.shape[1]}")
+            return made
+
+        chain.process = process  # type: ignore[method-assign]
+        self.worker = RadarWorker(chain.site, chain, 64, lambda sector: True, self.record)
+
+    def record(self, chain: RadarChain, block: Sweeps) -> None:
+        self.events.append(f"record {block.row[0]} {chain.expected.shape[1]}")
+
+
+def test_a_block_is_recorded_before_the_chain_works_on_it_with_what_it_expects() -> None:
+    watched = Watched()
+    worker, blocks = watched.worker, list(turn(0))
+    column = np.zeros(3)
+    watched.during = lambda: worker.expect(column, column, column, column + 0.1)
+    worker.start()
+    worker.put(blocks[0])
+    until(lambda: len(watched.events) == 3, "the first block is worked on")
+    worker.put(blocks[1])
+    until(lambda: len(watched.events) == 6, "the second block is worked on")
+    worker.stop()
+    first, second = blocks[0].row[0], blocks[1].row[0]
+    assert watched.events == [
+        f"record {first} 0", f"work {first} 0", f"done {first} 0",
+        f"record {second} 3", f"work {second} 3", f"done {second} 3",
+    ]  # fmt: skip
+
+
+def test_a_chain_that_takes_over_is_told_what_to_expect() -> None:
+    running = Running(small_chain(bearing=Moments()))
+    running.worker.start()
+    running.worker.expect([1.0], [2.0], [0.5], [0.1])
+    running.turns(0, 1)
+    other = small_chain(extractor=Manhattan(min_cells=3), bearing=Moments())
+    running.worker.succeed(other, lambda _: None)
+    running.turns(1, 2)
+    assert running.worker.chain is other
+    assert other.expected.shape == (4, 1)
+    running.worker.stop()
+
+
+def test_a_block_that_cannot_be_recorded_is_counted_and_the_next_is_worked_on() -> None:
+    sectors: list[SectorPlots] = []
+    chain = small_chain()
+    recorded: list[int] = []
+
+    def record(_chain: RadarChain, block: Sweeps) -> None:
+        recorded.append(len(block))
+        if len(recorded) == 1:
+            raise RuntimeError("broken")
+
+    worker = RadarWorker(chain.site, chain, 64, lambda sector: sectors.append(sector) or True, record)
+    worker.start()
+    for block in turn(0):
+        worker.put(block)
+    until(lambda: len(recorded) == BLOCKS and not len(worker.queue), "all are recorded")
+    worker.ask(lambda _: None).result(10)
+    worker.stop()
+    assert worker.failures == 1
+    assert len(sectors) == BLOCKS
