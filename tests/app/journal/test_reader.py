@@ -25,7 +25,7 @@ from pipeline.tables.codec import encode
 from pipeline.values import ValueCodec
 from tests.app.journal.writing import ATTACHMENTS, START, body, chunked
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def numbers(records: list[Record]) -> list[int]:

@@ -164,6 +164,22 @@ def test_other_parts_of_the_chain_change_the_picture(tmp_path: Path, order: str)
     assert {one.name for one in only.figures() if one.recorded != one.replayed} <= {"same target, distance, 95 %"}
 
 
+def test_after_a_gap_in_the_sweeps_detection_goes_on_from_the_next_state(tmp_path: Path) -> None:
+    made = Recorded(tmp_path)
+    made.turns(4)
+    writer = made.service.journal
+    assert writer is not None
+    limits = writer._limits
+    writer._limits = replace(limits, queue_records=0)
+    made.turns(2)
+    writer._limits = limits
+    until(lambda: made.sensor("journal").status == "ok", "a snapshot ends the gap")
+    made.turns(4)
+    found = verify(open_journal(made.stop()))
+    assert (found.difference, found.gaps) == (None, 1)
+    assert found.sectors > 35
+
+
 def test_without_sweeps_another_detector_is_refused(tmp_path: Path) -> None:
     made = Recorded(tmp_path, {"sweeps": False})
     made.turns(2)
