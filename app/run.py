@@ -59,6 +59,10 @@ class Running:
         self.service = SurfaceService(settings, airport, document)
         self.store = Store(settings.database, settings, airport)
         self.hub = Hub(self.service, settings)
+        if settings.journal.folder is not None and settings.journal.display:
+            from app.journal.display import DisplayRecorder
+
+            DisplayRecorder(self.hub, lambda: self.service.journal, self.service.clock.now)
         self.view3d: View3D | None = None
         view_router = None
         if settings.view3d:

@@ -16,6 +16,7 @@ from app.ingest.octets import OctetIntake
 from app.ingest.udp import VideoReceiver
 from app.journal.recorder import JournalRecorder
 from app.journal.video import VideoRecorder
+from app.journal.writer import JournalWriter
 from app.runtime.clocks import FeedTimes, RadarTimes
 from app.runtime.compile_apart import CompilerApart
 from app.runtime.front_end import FrontEndSwitch
@@ -151,6 +152,11 @@ class SurfaceService:
             self._surface.stop()
         if self._journal is not None and not self._journal.close():
             log.error("the end of the journal could not be written in time")
+
+    @property
+    def journal(self) -> JournalWriter | None:
+        """The journal; None when none is written, and before `prepare`."""
+        return None if self._journal is None else self._journal.writer
 
     def video_port(self, radar: str) -> int:
         """The UDP port that a radar's datagrams go to. Raises UnknownId."""

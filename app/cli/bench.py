@@ -18,6 +18,7 @@ def register(app: typer.Typer) -> None:
     group.callback()(bench)
     group.command("picture")(picture)
     group.command("soak")(soak)
+    group.command("journal")(journal)
     app.add_typer(group, name="bench")
 
 
@@ -72,6 +73,37 @@ def soak(
         f" {result.growth_mib:+.1f} MiB since a tenth of the way",
         highlight=False,
     )
+
+
+def journal(
+    seconds: Annotated[int, typer.Option(min=5, help="Length of the measurement, at the pace of the clock.")] = 60,
+    targets: Annotated[int, typer.Option(min=1, help="Targets that move on the airport.")] = 100,
+    seed: Annotated[int, typer.Option(min=0, help="Of the simulated world and its radar video.")] = 1,
+) -> None:
+    """Measure what the journal costs: the same inputs through an engine with a journal and one without, in one run."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from app.bench.journal import MOST_MB_S, MOST_SHARE, measure_journal
+
+    console = Console()
+    with console.status("") as status:
+        cost = measure_journal(seconds, targets, seed, lambda what: status.update(f"{what} ..."))
+    title = f"The journal without raw sweeps, {cost.targets} targets ({cost.tracks:.0f} tracks), {cost.seconds:g} s"
+    table = Table(title=title, title_justify="left")
+    for name in ("figure", "measured", "wanted", ""):
+        table.add_column(name, justify="left" if name in ("figure", "") else "right")
+    table.add_row("surface thread, a picture, without", f"{cost.without_us:.0f}", "", "us")
+    table.add_row("surface thread, a picture, with the journal", f"{cost.with_us:.0f}", "", "us")
+    table.add_row("added to the surface thread", f"{100 * cost.surface:.2f}", "", "% of a core")
+    table.add_row("the writer's thread", f"{100 * cost.writer:.2f}", "", "% of a core")
+    for name, value, most, unit in (
+        ("both", 100 * cost.share, 100 * MOST_SHARE, "% of a core"),
+        ("on disk", cost.mb_s, MOST_MB_S, "MB/s"),
+        ("records dropped", cost.dropped, 0, ""),
+    ):
+        table.add_row(name, f"{value:.3g}", f"<= {most:g}", unit, style=None if value <= most else "red")
+    console.print(table)
 
 
 def _tracker(peers: bool) -> tuple[str, ...]:

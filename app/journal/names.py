@@ -21,6 +21,9 @@ SNAPSHOT = "snapshot"
 GAP = "gap"
 """Topic of records that say how many others could not be written, and why."""
 
+DISPLAY = "display"
+"""Optional topic: the messages of the live feed (JSON text) as they were sent to the displays."""
+
 _NAME = re.compile(r"airside-(\d{8}T\d{6}Z)-([0-9a-f]{8})-(\d{4,})\.mcap")
 
 

@@ -9,6 +9,7 @@ import secrets
 import threading
 import time
 from collections import Counter, deque
+from collections.abc import Callable
 from typing import Any, Protocol
 
 from app.contract import Service
@@ -86,6 +87,8 @@ class Hub:
         self._status_at = 0.0
         self._status_text: str | None = None
         self.status_version = 0
+        self.on_start: list[Callable[[], None]] = []
+        """Called on the event loop when it begins."""
 
     def publish(self, picture: Picture, changes: tuple[AlertChange, ...]) -> None:
         """Take a new picture (a `PictureListener`); returns at once, never raises. The newest picture wins."""
@@ -123,6 +126,8 @@ class Hub:
             self._scheduled = True
         self._watch = loop.create_task(self._watch_clients(), name="feed-watch")
         self._take()
+        for begin in self.on_start:
+            begin()
 
     async def stop(self) -> None:
         """Close all clients (1001, going away) and end."""

@@ -20,7 +20,9 @@ from app.journal.reader import open_journal
 from app.journal.recorder import SETTINGS_FILE
 from app.journal.video import VideoRecorder
 from app.replay.compare import compare
+from app.replay.recorded import recorded_run
 from app.replay.verify import verify
+from app.replay.video import VideoReplay
 from app.runtime.host_clock import HostClock
 from app.service import SurfaceService
 from app.settings import JournalSettings, PartSettings, PartsSettings, RadarSettings, SettingsError
@@ -28,7 +30,7 @@ from pipeline.bearing.moments import Moments
 from pipeline.engine_records import CHAIN, CODEC, INPUT, SWEEPS, ChainBlock
 from pipeline.inputs import PartsChanged
 from pipeline.picture import Picture, SensorState
-from pipeline.tables import SectorPlots, Sweeps
+from pipeline.tables import Plots, SectorPlots, Sweeps
 from tests.app.replay.recording import airport, decoded, document, records, settings
 from tests.app.runtime.small_radar import AZIMUTHS, RANGES, T0, VIDEO, small_chain, small_site, turn
 from tests.support.running import until
@@ -162,6 +164,43 @@ def test_other_parts_of_the_chain_change_the_picture(tmp_path: Path, order: str)
     assert changed, "the order has no effect"
     only = compare(journal, ("parts.detect.name=hybrid",))
     assert {one.name for one in only.figures() if one.recorded != one.replayed} <= {"same target, distance, 95 %"}
+
+
+def test_after_a_gap_in_the_sweeps_detection_goes_on_from_the_next_state(tmp_path: Path) -> None:
+    made = Recorded(tmp_path)
+    made.turns(4)
+    writer = made.service.journal
+    assert writer is not None
+    limits = writer._limits
+    writer._limits = replace(limits, queue_records=0)
+    made.turns(2)
+    writer._limits = limits
+    until(lambda: made.sensor("journal").status == "ok", "a snapshot ends the gap")
+    made.turns(4)
+    found = verify(open_journal(made.stop()))
+    assert (found.difference, found.gaps) == (None, 1)
+    assert found.sectors > 35
+
+
+@pytest.mark.parametrize("own", [frozenset(), frozenset({"extract"})])
+def test_where_records_are_missing_a_recorded_chain_waits_for_its_next_state(day: Path, own: frozenset[str]) -> None:
+    journal = open_journal(day)
+    run = recorded_run(journal.files[0].attachments(), "day")
+    taken = [one for one in journal.records() if one.topic in (CHAIN, SWEEPS)]
+    video = VideoReplay(run, own)
+    assert [one.topic for one in taken[:4]] == [CHAIN, SWEEPS, SWEEPS, SWEEPS]
+
+    def sector(block: Sweeps) -> SectorPlots | None:
+        time = float(block.time[-1])
+        return video.sector(SectorPlots(0, block.scan, time, 0, 0, Plots.empty()))
+
+    for one in taken[:3]:
+        video.take(one)
+    assert sector(decoded(taken[1]).block) is not None
+    video.forget()
+    assert sector(decoded(taken[2]).block) is None
+    video.take(taken[3])
+    assert (sector(decoded(taken[3]).block) is None) == (not own)
 
 
 def test_without_sweeps_another_detector_is_refused(tmp_path: Path) -> None:
