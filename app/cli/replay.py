@@ -33,7 +33,10 @@ Until = Annotated[str | None, typer.Option("--until", metavar="T", help="Journal
 Change = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Journal: as in parts.lifecycle=m_of_n.")
 ]
-HttpPort = Annotated[int, typer.Option("--http-port", min=0, max=65535, help="Journal: where displays are served.")]
+HttpPort = Annotated[
+    int,
+    typer.Option("--http-port", envvar="AIRSIDE_PORT", min=0, max=65535, help="Journal: port of the displays."),
+]
 Radar = Annotated[str | None, typer.Option(help="Video: the radar of the settings it stands for; the first if none.")]
 To = Annotated[str | None, typer.Option(help="Video: udp://host:port; the radar's own port on this machine if none.")]
 Loop = Annotated[bool, typer.Option("--loop", help="Video: begin again at the end.")]
