@@ -31,6 +31,11 @@ class Waiting:
     answer: Future[Any] | None = None
 
 
+def impaired_radars(sensors: tuple[SensorState, ...]) -> tuple[str, ...]:
+    """The ids of the radars that are not ok."""
+    return tuple(one.id for one in sensors if one.kind == "radar" and one.status != "ok")
+
+
 class Recorder(Protocol):
     """What hears of everything that enters the engine and of everything that comes out, in order (`app.journal`)."""
 
@@ -48,7 +53,8 @@ class SurfaceWorker:
     """Owns the engine: nobody else touches it.
 
     sensors: asked for the health of all once a picture. timings: those of the radars. expect: hears of each picture,
-    to tell the radars what comes. recorder: hears of all inputs and outcomes.
+    to tell the radars what comes. recorder: hears of all inputs and outcomes. impaired: of the health of all, the ids
+    of those without which the picture is not whole.
     """
 
     def __init__(
@@ -60,6 +66,7 @@ class SurfaceWorker:
         expect: Callable[[Picture], None] = lambda _: None,
         clock: HostClock | None = None,
         recorder: Recorder | None = None,
+        impaired: Callable[[tuple[SensorState, ...]], tuple[str, ...]] = impaired_radars,
     ) -> None:
         self.engine = engine
         self.inbox: Inbox[Waiting] = Inbox(limit)
@@ -68,6 +75,7 @@ class SurfaceWorker:
         self._clock = clock or HostClock()
         self._recorder = recorder
         self._sensors = sensors
+        self._impaired = impaired
         self._timings = timings
         self._expect = expect
         self._listeners: list[PictureListener] = []
@@ -142,7 +150,7 @@ class SurfaceWorker:
         except Exception:
             self._failed("the sensors could not be asked")
             return None
-        degraded = tuple(one.id for one in sensors if one.kind == "radar" and one.status != "ok")
+        degraded = self._impaired(sensors)
         if degraded != self._degraded and self._step(Envelope(self._clock.now(), SensorHealth(degraded))) is not None:
             self._degraded = degraded
         return sensors

@@ -174,6 +174,7 @@ def test_a_radar_whose_clock_steps_goes_on_and_says_so(tmp_path: Path, step: flo
             assert state.status == "degraded"
             assert f"clock stepped {'+' if (step > 0) == (wrong == step) else '-'}" in state.detail
             assert state.clock_offset_s == pytest.approx(wrong, abs=0.05)
+            assert not running.service._running.engine.sensors_degraded, "what is corrected holds no alert back"
             until(lambda: running.time() > running.now - 0.2, "the picture goes on")
             running.turns(6, wrong)
             assert running.sensor("smr-1").counters["block_failures"] == 0
@@ -225,5 +226,29 @@ def test_a_leap_second_at_midnight_loses_no_sweep_over_udp(tmp_path: Path) -> No
         assert state.counters["lost"] == state.counters["late"] == state.counters["azimuth_backwards"] == 0
         assert state.last is not None
         until(lambda: abs(running.sensor("smr-1").last - running.service.clock.now()) < 1.5, "near arrival")  # type: ignore[operator]
+    finally:
+        running.service.stop()
+
+
+def test_without_a_radar_silent_reports_make_the_picture_degraded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    running = Running(tmp_path)
+    try:
+        engine = running.service._running.engine
+        path, row = PLACE["reports"]
+        assert running.ask("POST", path, json={**row, "time": time.time()}).status_code == 200
+        until(lambda: running.time() > 0, "the report is taken")
+        assert not engine.sensors_degraded
+        monkeypatch.setattr("app.service.SENSOR_SILENT_S", 0.2)
+        wrong = {**row, "time": time.time() + 3600}
+        until(
+            lambda: running.ask("POST", path, json=wrong).status_code == 422 and engine.sensors_degraded,
+            "nothing was accepted any more",
+        )
+        assert running.sensor("reports").status == "degraded"
+        monkeypatch.setattr("app.service.SENSOR_SILENT_S", 10.0)
+        assert running.ask("POST", path, json={**row, "time": time.time()}).status_code == 200
+        until(lambda: not engine.sensors_degraded, "it is well again")
     finally:
         running.service.stop()
