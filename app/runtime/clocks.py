@@ -61,6 +61,12 @@ class RadarTimes:
         with self._lock:
             return self._radar.words(self._host.now())
 
+    @property
+    def late(self) -> bool:
+        """The radar's video comes too late to be of use."""
+        with self._lock:
+            return self._radar.late
+
     def shown(self, state: SensorState) -> SensorState:
         """The radar's state with what is known of its clock."""
         with self._lock:
