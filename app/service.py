@@ -294,7 +294,9 @@ class SurfaceService:
         A radar whose clock is corrected is not one of them: its picture is whole. Without a radar the picture rests on
         the reports.
         """
-        silent = tuple(id for id, worker in self._workers.items() if worker.status != "ok")
+        silent = tuple(
+            id for id, worker in self._workers.items() if worker.status != "ok" or self._radar_times[id].late
+        )
         if not self.radars and "reports" in self._heard and self._is_silent("reports"):
             return (*silent, "reports")
         return silent

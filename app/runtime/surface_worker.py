@@ -138,9 +138,10 @@ class SurfaceWorker:
                 waiting = self.inbox.take_all(TICK_S)
             except Closed:
                 return
+            taken = self._clock.now()  # what comes while this is worked on must not be overtaken by the tick
             sensors = self._health()
             outcomes = [outcome for one in waiting if (outcome := self._take(one)) is not None]
-            outcomes += self._tick()
+            outcomes += self._tick(taken)
             self._publish(outcomes, sensors)
 
     def _health(self) -> tuple[SensorState, ...] | None:
@@ -155,7 +156,7 @@ class SurfaceWorker:
             self._degraded = degraded
         return sensors
 
-    def _tick(self) -> list[Outcome]:
+    def _tick(self, arrival: float) -> list[Outcome]:
         now, made = time.monotonic(), []
         step = self._clock.take_step()
         if step:
@@ -163,7 +164,7 @@ class SurfaceWorker:
             made.append(self._step(Envelope(self._clock.now(), ClockStep(step))))
         if now - self._ticked >= TICK_S:
             self._ticked = now
-            made.append(self._step(Envelope(self._clock.now(), Tick())))
+            made.append(self._step(Envelope(arrival + step, Tick())))
         return [one for one in made if one is not None]
 
     def _take(self, waiting: Waiting) -> Outcome | None:

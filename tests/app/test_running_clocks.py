@@ -21,7 +21,8 @@ from app.runtime.host_clock import HostClock
 from app.service import SurfaceService
 from app.settings import NodeSettings, PartSettings, PartsSettings, RadarSettings, Settings, UdpSettings
 from pipeline.asterix.cat240 import encode_sweeps as encode_datagrams
-from pipeline.picture import SensorState
+from pipeline.picture import AlertChange, Picture, SensorState
+from pipeline.tables import TrackPhase
 from tests.app.runtime.small_radar import AZIMUTHS, RANGES, T0, VIDEO, small_site, turn
 from tests.support.running import until
 from tests.support.small_airport import as_geojson, small_airport
@@ -140,6 +141,74 @@ def test_a_clock_0_7_s_ahead_is_corrected_and_shown(running: Running) -> None:
     assert state.clock_offset_s == pytest.approx(0.7, abs=0.3)
     assert state.last is not None
     assert state.last <= time.time()
+
+
+class Standing:
+    """UTC that goes on when the test says so."""
+
+    now = 1.8e9
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.mark.parametrize("going_on", ["refused", "silent"])
+def test_tracks_coast_and_end_and_alerts_clear_though_nothing_is_accepted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, going_on: str
+) -> None:
+    """An airliner on a closed runway, then only reports of a wrong time, or none; then good ones again."""
+    monkeypatch.setattr("app.runtime.surface_worker.TICK_S", 0.02)
+    monkeypatch.setattr("app.service.SENSOR_SILENT_S", 0.5)
+    clock = Standing()
+    running = Running(tmp_path, clock=HostClock(clock, clock))
+    try:
+        changes: list[AlertChange] = []
+        running.service.listen(lambda _, more: changes.extend(more))
+        latitude, longitude = running.service.airport.frame.to_geodetic(-100.0, 50.0)
+        airliner = {"lat": float(latitude), "lon": float(longitude), "address": "39abcd", "callsign": "AFR12",
+                    "speed_mps": 0.0, "category": "aircraft"}  # fmt: skip
+
+        def picture() -> Picture:
+            made = running.service.picture()
+            assert made is not None
+            return made
+
+        def second(offset: float | None) -> int:
+            """A second passes, with a report at its end; its status."""
+            clock.now += 1.0
+            answer = 0
+            if offset is not None:
+                sent = {**airliner, "time": clock.now + offset}
+                answer = running.ask("POST", "/targets/reports", json=sent).status_code
+            until(lambda: running.time() >= clock.now - 1.0, "time goes on")
+            return answer
+
+        assert running.ask("PUT", "/runways/06/24/state", json={"open": False}).status_code == 200
+        for _ in range(12):
+            assert second(0.0) == 200
+        until(lambda: len(picture().alerts) == 1, "the alert is raised")
+        (alert,) = picture().alerts
+        until(lambda: running.service._running.engine.sensors_degraded, "the reports are called silent")
+        phases = []
+        for _ in range(60):
+            assert second(3600.0 if going_on == "refused" else None) in (0, 422)
+            phases += picture().tracks.phase.tolist()
+        until(lambda: not len(picture().tracks) and not picture().alerts, "track and alert are over")
+        assert TrackPhase.COASTING in phases
+        assert clock.now - 1.0 <= picture().time <= clock.now
+        cleared = changes[-1].alert
+        assert (cleared.id, cleared.clear_reason) == (alert.id, "sensor lost")
+        assert cleared.cleared_at is not None
+        assert clock.now - 60.0 < cleared.cleared_at < clock.now
+        if going_on == "refused":
+            state = running.sensor("reports")
+            assert (state.status, state.counters["taken"], state.counters["refused_ahead"]) == ("degraded", 12, 60)
+        for _ in range(12):
+            assert second(0.0) == 200
+        until(lambda: len(picture().tracks) == 1 and len(picture().alerts) == 1, "it goes on")
+        assert picture().alerts[0].id == alert.id + 1
+    finally:
+        running.service.stop()
 
 
 class Turning(Running):
