@@ -29,6 +29,9 @@ WORDS_EVERY_S = 2.0
 SENDER_KEPT_S = 60.0
 """The clock of an address is forgotten when it has not been heard for so long: twice what its estimate looks back."""
 
+SENDER_SHOWN_S = 10.0
+"""Of addresses heard within so long the clock that is furthest off is shown: a standing aircraft reports every 5 s."""
+
 MOST_SENDERS = 4096
 """Addresses whose clocks are kept; made-up ones must not fill the memory. Several times what a busy airport hears."""
 
@@ -76,10 +79,13 @@ class RadarTimes:
 
 @dataclass(slots=True)
 class _Sender:
-    """One sender's clock. heard: steady s of its newest row."""
+    """One sender's clock. heard: steady s of its newest row. refused_at: of the newest that was refused, and refused:
+    how many were since it last was in order for REFUSED_TOLD_S."""
 
     clock: SourceClock
     heard: float = 0.0
+    refused_at: float = -np.inf
+    refused: int = 0
 
 
 class FeedTimes:
@@ -102,8 +108,6 @@ class FeedTimes:
         self._senders: dict[str, _Sender] = {}
         self._forgotten_steps = 0
         self._refused: Counter[str] = Counter()
-        self._lately = 0
-        self._lately_of: set[str] = set()
         self._told: tuple[float, str] = (-np.inf, "")
         self._words: tuple[float, str] = (-np.inf, "")
         self._lock = threading.Lock()
@@ -117,15 +121,16 @@ class FeedTimes:
             refused: Counter[str] = Counter()
             answer = ""
             for name, rows in self._by_sender(table):
-                verdict = self._sender(name).clock.take(table.time[rows], arrival)
+                sender = self._sender(name)
+                verdict = sender.clock.take(table.time[rows], arrival)
                 times[rows], ok[rows] = verdict.time, verdict.ok
                 if verdict.refused:
                     refused.update(verdict.refused)
-                    self._lately_of.add(name)
+                    sender.refused_at = sender.heard
+                    sender.refused += sum(verdict.refused.values())
                     answer = answer or f"{name}{': ' if name else ''}{verdict.answer}"
                     self._told = (self._steady(), verdict.words)
             self._refused.update(refused)
-            self._lately += sum(refused.values())
             self._forget()
         return table[ok].replace(time=times[ok], arrival=arrival), dict(refused), answer
 
@@ -139,7 +144,9 @@ class FeedTimes:
         with self._lock:
             self._forget()
             clocks = [one.clock for one in self._senders.values()]
-            worst = max(clocks, key=lambda one: abs(one.offset or 0.0), default=None)
+            newest = max((one.heard for one in self._senders.values()), default=0.0)
+            shown = [one.clock for one in self._senders.values() if self._names or newest - one.heard <= SENDER_SHOWN_S]
+            worst = max(shown, key=lambda one: abs(one.offset or 0.0), default=None)
             words = self._current_words()
             counts = {f"refused_{name}": n for name, n in sorted(self._refused.items())}
             counts["clock_steps"] = self._forgotten_steps + sum(one.steps for one in clocks)
@@ -175,6 +182,8 @@ class FeedTimes:
         """The sender, the one heard last at the end."""
         one = self._senders.pop(name, None) or _Sender(SourceClock(self._rules))
         one.heard = self._steady()
+        if one.heard - one.refused_at >= REFUSED_TOLD_S:
+            one.refused = 0
         self._senders[name] = one
         return one
 
@@ -192,16 +201,18 @@ class FeedTimes:
         now = self._steady()
         at, why = self._told
         if now - at >= REFUSED_TOLD_S:
-            self._lately, self._words = 0, (-np.inf, "")
-            self._lately_of.clear()
+            self._words = (-np.inf, "")
         elif now - self._words[0] >= WORDS_EVERY_S:
-            cause, _, rest = why.partition(": ")
-            many = f"{self._lately:,} {self._word}{'s' if self._lately > 1 else ''}"
-            senders = len(self._lately_of)
-            who = f"{min(self._lately_of)} " if senders == 1 and "" not in self._lately_of else ""
-            of = f" of {senders:,} senders" if senders > 1 else ""
-            self._words = (now, f"{who}{many}{of} {cause} refused{': ' if rest else ''}{rest}")
+            self._words = (now, self._who_and_how_many(now, why))
         return self._words[1]
+
+    def _who_and_how_many(self, now: float, why: str) -> str:
+        told = {name: one for name, one in self._senders.items() if now - one.refused_at < REFUSED_TOLD_S}
+        cause, _, rest = why.partition(": ")
+        count = sum(one.refused for one in told.values())
+        who = f"{next(iter(told))} ".lstrip() if len(told) == 1 else ""
+        of = f" of {len(told):,} senders" if len(told) > 1 else ""
+        return f"{who}{count:,} {self._word}{'s' if count > 1 else ''}{of} {cause} refused{': ' if rest else ''}{rest}"
 
 
 def _shown(state: SensorState, offset: float | None, spread: float | None, counts: dict[str, int]) -> SensorState:

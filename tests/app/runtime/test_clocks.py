@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from app.runtime.clocks import MOST_SENDERS, REFUSED_TOLD_S, SENDER_KEPT_S, WORDS_EVERY_S, FeedTimes, RadarTimes
+from app.runtime.clocks import (
+    MOST_SENDERS,
+    REFUSED_TOLD_S,
+    SENDER_KEPT_S,
+    SENDER_SHOWN_S,
+    WORDS_EVERY_S,
+    FeedTimes,
+    RadarTimes,
+)
 from app.runtime.host_clock import HostClock
 from app.settings import ClockSettings
 from pipeline.picture import SensorState
@@ -85,6 +93,10 @@ def test_who_was_refused_is_said_or_how_many() -> None:
     steady.now += WORDS_EVERY_S
     feed.judge(addressed(["39abcd"], 18.0), NOW)
     assert feed.words() == "3 reports of 2 senders ahead 18 s refused: GPS time?"
+    for _ in range(20):
+        steady.now += WORDS_EVERY_S
+        feed.judge(addressed(["39ffff", "39abcd"], 3600.0, 0.0), NOW)
+    assert feed.words() == "39ffff 22 reports ahead 3,600 s refused: local time?", "39abcd is long since in order"
 
 
 def test_addresses_that_are_gone_are_forgotten_and_made_up_ones_do_not_fill_the_memory() -> None:
@@ -97,6 +109,10 @@ def test_addresses_that_are_gone_are_forgotten_and_made_up_ones_do_not_fill_the_
     feed.judge(addressed(["39ffff"], 4.5), NOW)
     steady.now += SENDER_KEPT_S + 1.0
     assert feed.shown(state()).clock_offset_s is None
+    feed.judge(addressed(["39ffff"], 4.5), NOW)
+    steady.now += SENDER_SHOWN_S + 1.0
+    feed.judge(addressed(["39abcd"], 0.0), NOW)
+    assert feed.shown(state()).clock_offset_s == 0.0, "what is shown is of those that still speak"
     events = FeedTimes("event", ClockSettings(), ["A1"], steady=steady)
     events.judge(NodeEvents.build(1, node=0, time=NOW - 0.5), NOW)
     steady.now += SENDER_KEPT_S + 1.0
