@@ -215,8 +215,9 @@ class Turning(Running):
     """With a radar that is posted to, and a host whose clock goes with its turns."""
 
     def __init__(self, folder: Path) -> None:
-        self.now = T0
-        super().__init__(folder, radar_settings(), clock=HostClock(lambda: self.now, lambda: self.now))
+        self.now, self.host_wrong = T0, 0.0
+        clock = HostClock(lambda: self.now + self.host_wrong, lambda: self.now)
+        super().__init__(folder, radar_settings(), clock=clock)
         self.scan = 0
 
     def turns(self, many: int, wrong: float = 0.0) -> None:
@@ -253,6 +254,22 @@ def test_a_radar_whose_clock_steps_goes_on_and_says_so(tmp_path: Path, step: flo
         surface = running.service._surface
         assert surface is not None
         assert surface.engine.tracker.counters.get("sector_late", 0) == 0
+    finally:
+        running.service.stop()
+
+
+@pytest.mark.parametrize("step", [3600.0, -3600.0])
+def test_when_the_clock_of_the_host_is_set_the_picture_goes_with_it_once(tmp_path: Path, step: float) -> None:
+    running = Turning(tmp_path)
+    try:
+        running.turns(4)
+        for wrong in (step, 0.0):
+            running.host_wrong = wrong
+            running.turns(4)
+            until(lambda wrong=wrong: abs(running.now + wrong - running.time()) < 0.3, "the picture goes on")
+            counters = running.service._running.engine.counters
+            lost = sum(counters.get(f"sector_{why}", 0) for why in ("late", "ahead"))
+            assert lost <= 2 * 8, "a turn at each step at most"
     finally:
         running.service.stop()
 
