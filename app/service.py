@@ -77,6 +77,7 @@ class SurfaceService:
         self._surface: SurfaceWorker | None = None
         self._journal: JournalRecorder | None = None
         self._heard: dict[str, tuple[float, float, int]] = {}
+        self._heard_lock = threading.Lock()
         self._octets = {
             site.id: OctetIntake(site, index, radar.blocks_per_scan)
             for index, (site, radar) in enumerate(zip(self.radars, settings.radars, strict=True))
@@ -111,6 +112,7 @@ class SurfaceService:
             self._expect,
             clock=self.clock,
             recorder=self._journal,
+            impaired=self._impaired,
         )
         for index, (site, radar) in enumerate(zip(self.radars, self.settings.radars, strict=True)):
             ground = surface_of_radar(self.airport, site)
@@ -286,10 +288,27 @@ class SurfaceService:
         if len(good):
             if not surface.offer(good):
                 raise Refused(f"the queue for {kind} is full")
-            _, _, total = self._heard.get(kind, (0.0, 0.0, 0))
-            self._heard[kind] = (time.monotonic(), float(good.time.max()), total + len(good))
+            with self._heard_lock:  # requests come in several threads
+                _, _, total = self._heard.get(kind, (0.0, 0.0, 0))
+                self._heard[kind] = (time.monotonic(), float(good.time.max()), total + len(good))
             keep(good)
         return {"taken": len(good), **{f"refused_{reason}": count for reason, count in refused.items()}}
+
+    def _impaired(self, _sensors: tuple[SensorState, ...]) -> tuple[str, ...]:
+        """Sensors without which the picture is not whole, so that alerts are held at information.
+
+        A radar whose clock is corrected is not one of them: its picture is whole. Without a radar the picture rests on
+        the reports.
+        """
+        silent = tuple(
+            id for id, worker in self._workers.items() if worker.status != "ok" or self._radar_times[id].late
+        )
+        if not self.radars and "reports" in self._heard and self._is_silent("reports"):
+            return (*silent, "reports")
+        return silent
+
+    def _is_silent(self, feed: str) -> bool:
+        return time.monotonic() - self._heard[feed][0] > SENSOR_SILENT_S
 
     def _first_picture(self, picture: Picture, _changes: tuple[AlertChange, ...]) -> None:
         self.checks["picture"] = True
@@ -328,7 +347,7 @@ class SurfaceService:
         heard, times = self._heard.get(id), self._feed_times[id]
         if heard is None:
             return times.shown(SensorState(id, kind, "waiting", None, simulated))
-        silent = time.monotonic() - heard[0] > SENSOR_SILENT_S and kind != "node"
+        silent = kind != "node" and self._is_silent(id)
         state = SensorState(id, kind, "silent" if silent else "ok", heard[1], simulated, counters={"taken": heard[2]})
         return times.shown(state)
 

@@ -27,7 +27,10 @@ class ClockStep:
 
 @dataclass(frozen=True, slots=True)
 class SensorHealth:
-    """degraded: ids of the radars that are silent, waiting or degraded; alerts are held at information while any is."""
+    """degraded: ids of the sensors without which the picture is not whole; alerts are held at information while any is.
+
+    They are the radars that are silent, waiting, cut short or too late; without a radar the reports when silent.
+    """
 
     degraded: tuple[str, ...] = ()
 

@@ -6,10 +6,11 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.runtime.host_clock import HostClock
 from app.settings import ClockSettings
@@ -17,13 +18,22 @@ from pipeline.picture import SensorState
 from pipeline.sites import RadarSite
 from pipeline.tables import NodeEvents, Sweeps, TargetReports
 from pipeline.timing.radar_clock import RadarClock
-from pipeline.timing.source_clock import ClockRules, SourceClock, Verdict
+from pipeline.timing.source_clock import ClockRules, SourceClock
 
 REFUSED_TOLD_S = 30.0
 """A source is called degraded for so long after it was refused something."""
 
 WORDS_EVERY_S = 2.0
 """The figures in the words change at most this often: every new word is stored and sent."""
+
+SENDER_KEPT_S = 60.0
+"""The clock of an address is forgotten when it has not been heard for so long: twice what its estimate looks back."""
+
+SENDER_SHOWN_S = 10.0
+"""Of addresses heard within so long the clock that is furthest off is shown: a standing aircraft reports every 5 s."""
+
+MOST_SENDERS = 4096
+"""Addresses whose clocks are kept; made-up ones must not fill the memory. Several times what a busy airport hears."""
 
 Rows = TypeVar("Rows", NodeEvents, TargetReports)
 
@@ -54,6 +64,12 @@ class RadarTimes:
         with self._lock:
             return self._radar.words(self._host.now())
 
+    @property
+    def late(self) -> bool:
+        """The radar's video comes too late to be of use."""
+        with self._lock:
+            return self._radar.late
+
     def shown(self, state: SensorState) -> SensorState:
         """The radar's state with what is known of its clock."""
         with self._lock:
@@ -61,11 +77,23 @@ class RadarTimes:
         return _shown(state, offset, spread, {"time_rebased": rebased})
 
 
+@dataclass(slots=True)
+class _Sender:
+    """One sender's clock. heard: steady s of its newest row. refused_at: of the newest that was refused, and refused:
+    how many were since it last was in order for REFUSED_TOLD_S."""
+
+    clock: SourceClock
+    heard: float = 0.0
+    refused_at: float = -np.inf
+    refused: int = 0
+
+
 class FeedTimes:
     """Judges the times of reports or events. Any thread may call.
 
-    word: what one row is called, for a person. names: of the senders whose rows tell who sent them; empty: the rows
-    come from one source.
+    Each sender has a clock of its own, so that a wrong one harms nobody else: each node, and each address that reports;
+    reports without an address count as those of one sender. word: what one row is called, for a person. names: of the
+    nodes, in the order of the `node` column.
     """
 
     def __init__(
@@ -76,10 +104,11 @@ class FeedTimes:
         steady: Callable[[], float] = time.monotonic,
     ) -> None:
         self._word, self._names, self._steady = word, tuple(names), steady
-        self._clocks = [SourceClock(rules_of(settings)) for _ in self._names or ("",)]
+        self._rules = rules_of(settings)
+        self._senders: dict[str, _Sender] = {}
+        self._forgotten_steps = 0
         self._refused: Counter[str] = Counter()
-        self._lately = 0
-        self._told: tuple[float, str, str] = (-np.inf, "", "")
+        self._told: tuple[float, str] = (-np.inf, "")
         self._words: tuple[float, str] = (-np.inf, "")
         self._lock = threading.Lock()
 
@@ -88,21 +117,21 @@ class FeedTimes:
         if not len(table):
             return table, {}, ""
         with self._lock:
-            sender = np.zeros(len(table), np.int32)
-            if isinstance(table, NodeEvents):
-                sender = np.clip(table.node, 0, len(self._clocks) - 1)
             times, ok = table.time.copy(), np.ones(len(table), np.bool_)
             refused: Counter[str] = Counter()
             answer = ""
-            for one in np.unique(sender).tolist():
-                rows = np.flatnonzero(sender == one)
-                verdict = self._clocks[one].take(table.time[rows], arrival)
+            for name, rows in self._by_sender(table):
+                sender = self._sender(name)
+                verdict = sender.clock.take(table.time[rows], arrival)
                 times[rows], ok[rows] = verdict.time, verdict.ok
-                refused.update(verdict.refused)
-                if verdict.answer and not answer:
-                    answer = f"{self._names[one]}: {verdict.answer}" if self._names else verdict.answer
-                    self._tell(one, verdict)
-            self._count(refused)
+                if verdict.refused:
+                    refused.update(verdict.refused)
+                    sender.refused_at = sender.heard
+                    sender.refused += sum(verdict.refused.values())
+                    answer = answer or f"{name}{': ' if name else ''}{verdict.answer}"
+                    self._told = (self._steady(), verdict.words)
+            self._refused.update(refused)
+            self._forget()
         return table[ok].replace(time=times[ok], arrival=arrival), dict(refused), answer
 
     def words(self) -> str:
@@ -111,13 +140,16 @@ class FeedTimes:
             return self._current_words()
 
     def shown(self, state: SensorState) -> SensorState:
-        """A source's state with its clock, and degraded while rows are refused."""
+        """A source's state with its clock that is furthest off, and degraded while rows are refused."""
         with self._lock:
-            offsets = [(abs(one.offset), one) for one in self._clocks if one.offset is not None]
-            worst = max(offsets, key=lambda pair: pair[0])[1] if offsets else None
+            self._forget()
+            clocks = [one.clock for one in self._senders.values()]
+            newest = max((one.heard for one in self._senders.values()), default=0.0)
+            shown = [one.clock for one in self._senders.values() if self._names or newest - one.heard <= SENDER_SHOWN_S]
+            worst = max(shown, key=lambda one: abs(one.offset or 0.0), default=None)
             words = self._current_words()
             counts = {f"refused_{name}": n for name, n in sorted(self._refused.items())}
-            counts["clock_steps"] = sum(one.steps for one in self._clocks)
+            counts["clock_steps"] = self._forgotten_steps + sum(one.steps for one in clocks)
         if words:
             detail = "; ".join(one for one in (state.detail, words) if one)
             state = replace(state, status="degraded", detail=detail)
@@ -130,26 +162,57 @@ class FeedTimes:
         """Something was refused since the start."""
         return bool(self._refused)
 
-    def _tell(self, sender: int, verdict: Verdict) -> None:
-        who = f"{self._names[sender]} " if self._names else ""
-        self._told = (self._steady(), who, verdict.words)
+    def _by_sender(self, table: Rows) -> list[tuple[str, NDArray[np.intp]]]:
+        """Name and rows of each sender."""
+        if isinstance(table, NodeEvents):
+            senders = np.clip(table.node, 0, max(len(self._names) - 1, 0))
+        else:
+            senders = table.address
+        order = np.argsort(senders, kind="stable")
+        begins = np.flatnonzero(np.r_[True, senders[order][1:] != senders[order][:-1]])
+        parts = np.split(order, begins[1:])
+        return [(self._name(senders[rows[0]]), rows) for rows in parts]
 
-    def _count(self, refused: Counter[str]) -> None:
-        count = sum(refused.values())
-        if count:
-            self._refused.update(refused)
-            self._lately += count
+    def _name(self, sender: object) -> str:
+        if isinstance(sender, str):
+            return str(sender)
+        return self._names[int(sender)] if self._names else ""  # type: ignore[call-overload]
+
+    def _sender(self, name: str) -> _Sender:
+        """The sender, the one heard last at the end."""
+        one = self._senders.pop(name, None) or _Sender(SourceClock(self._rules))
+        one.heard = self._steady()
+        if one.heard - one.refused_at >= REFUSED_TOLD_S:
+            one.refused = 0
+        self._senders[name] = one
+        return one
+
+    def _forget(self) -> None:
+        """Forget addresses that are gone; nodes stay, however rarely they are passed."""
+        limit = self._steady() - SENDER_KEPT_S
+        while not self._names and self._senders:
+            name, oldest = next(iter(self._senders.items()))
+            if oldest.heard >= limit and len(self._senders) <= MOST_SENDERS:
+                return
+            self._forgotten_steps += oldest.clock.steps
+            del self._senders[name]
 
     def _current_words(self) -> str:
         now = self._steady()
-        at, who, why = self._told
+        at, why = self._told
         if now - at >= REFUSED_TOLD_S:
-            self._lately, self._words = 0, (-np.inf, "")
+            self._words = (-np.inf, "")
         elif now - self._words[0] >= WORDS_EVERY_S:
-            cause, _, rest = why.partition(": ")
-            many = f"{self._lately:,} {self._word}{'s' if self._lately > 1 else ''}"
-            self._words = (now, f"{who}{many} {cause} refused{': ' if rest else ''}{rest}")
+            self._words = (now, self._who_and_how_many(now, why))
         return self._words[1]
+
+    def _who_and_how_many(self, now: float, why: str) -> str:
+        told = {name: one for name, one in self._senders.items() if now - one.refused_at < REFUSED_TOLD_S}
+        cause, _, rest = why.partition(": ")
+        count = sum(one.refused for one in told.values())
+        who = f"{next(iter(told))} ".lstrip() if len(told) == 1 else ""
+        of = f" of {len(told):,} senders" if len(told) > 1 else ""
+        return f"{who}{count:,} {self._word}{'s' if count > 1 else ''}{of} {cause} refused{': ' if rest else ''}{rest}"
 
 
 def _shown(state: SensorState, offset: float | None, spread: float | None, counts: dict[str, int]) -> SensorState:

@@ -36,7 +36,7 @@ class HostClock:
         self._stepped = 0.0
 
     def now(self) -> float:
-        """UTC, s. Never less than before, but for a step (see `take_step`)."""
+        """UTC, s. Never less than before, but for a step (see `now_and_step`)."""
         with self._lock:
             return self._follow()
 
@@ -46,12 +46,12 @@ class HostClock:
             self._follow()
             return moment + self._anchor
 
-    def take_step(self) -> float:
-        """Seconds by which this clock has jumped since it was last asked; 0 when it has not."""
+    def now_and_step(self) -> tuple[float, float]:
+        """UTC, s, and the seconds by which this clock has jumped since this was last asked; 0 when it has not."""
         with self._lock:
-            self._follow()
+            now = self._follow()
             stepped, self._stepped = self._stepped, 0.0
-            return stepped
+            return now, stepped
 
     def _follow(self) -> float:
         steady = self._monotonic()

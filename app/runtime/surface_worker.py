@@ -31,6 +31,11 @@ class Waiting:
     answer: Future[Any] | None = None
 
 
+def impaired_radars(sensors: tuple[SensorState, ...]) -> tuple[str, ...]:
+    """The ids of the radars that are not ok."""
+    return tuple(one.id for one in sensors if one.kind == "radar" and one.status != "ok")
+
+
 class Recorder(Protocol):
     """What hears of everything that enters the engine and of everything that comes out, in order (`app.journal`)."""
 
@@ -48,7 +53,8 @@ class SurfaceWorker:
     """Owns the engine: nobody else touches it.
 
     sensors: asked for the health of all once a picture. timings: those of the radars. expect: hears of each picture,
-    to tell the radars what comes. recorder: hears of all inputs and outcomes.
+    to tell the radars what comes. recorder: hears of all inputs and outcomes. impaired: of the health of all, the ids
+    of those without which the picture is not whole.
     """
 
     def __init__(
@@ -60,6 +66,7 @@ class SurfaceWorker:
         expect: Callable[[Picture], None] = lambda _: None,
         clock: HostClock | None = None,
         recorder: Recorder | None = None,
+        impaired: Callable[[tuple[SensorState, ...]], tuple[str, ...]] = impaired_radars,
     ) -> None:
         self.engine = engine
         self.inbox: Inbox[Waiting] = Inbox(limit)
@@ -68,6 +75,7 @@ class SurfaceWorker:
         self._clock = clock or HostClock()
         self._recorder = recorder
         self._sensors = sensors
+        self._impaired = impaired
         self._timings = timings
         self._expect = expect
         self._listeners: list[PictureListener] = []
@@ -75,6 +83,8 @@ class SurfaceWorker:
         self._thread = threading.Thread(target=self._run, name="surface", daemon=True)
         self._degraded: tuple[str, ...] = ()
         self._ticked = 0.0
+        self._stamping = threading.Lock()
+        self._step_due = 0.0
 
     def start(self) -> None:
         """Begin."""
@@ -105,7 +115,7 @@ class SurfaceWorker:
 
     def offer(self, body: Input) -> bool:
         """Give the engine an input, stamped with the time of now. False, counted, when the queue is full."""
-        return self.inbox.offer(Waiting(Envelope(self._clock.now(), body)))
+        return self._put(body)
 
     def ask(self, command: Command, timeout: float = 5.0) -> Any:
         """Have the engine carry out a command, and give its answer; why it could not is raised (KeyError, ValueError).
@@ -115,7 +125,7 @@ class SurfaceWorker:
         answer: Future[Any] = Future()
         if not self.alive:
             raise Refused("the service is starting or ending")
-        if not self.inbox.offer(Waiting(Envelope(self._clock.now(), command), answer)):
+        if not self._put(command, answer):
             raise Refused("the queue for commands is full")
         try:
             return answer.result(timeout)
@@ -124,15 +134,30 @@ class SurfaceWorker:
                 raise Refused(f"no answer within {timeout:g} s; nothing was done") from error
             raise Refused(f"no answer within {timeout:g} s; it may still be done") from error
 
+    def _put(self, body: Input, answer: Future[Any] | None = None) -> bool:
+        """Queue an input; before the first that is stamped after a step of the host's clock, the step."""
+        with self._stamping:
+            now, step = self._clock.now_and_step()
+            self._step_due += step
+            if self._step_due and self.inbox.offer(Waiting(Envelope(now, ClockStep(self._step_due)))):
+                self._step_due = 0.0
+            if self._step_due:
+                return False  # without room for the step nothing may pass it; the next tick tells of it
+            return self.inbox.offer(Waiting(Envelope(now, body), answer))
+
     def _run(self) -> None:
         while True:
             try:
                 waiting = self.inbox.take_all(TICK_S)
             except Closed:
                 return
+            # stamped here: the tick must not overtake what comes while this is worked on
+            with self._stamping:
+                taken, step = self._clock.now_and_step()
+                step, self._step_due = step + self._step_due, 0.0
             sensors = self._health()
             outcomes = [outcome for one in waiting if (outcome := self._take(one)) is not None]
-            outcomes += self._tick()
+            outcomes += self._tick(taken, step)
             self._publish(outcomes, sensors)
 
     def _health(self) -> tuple[SensorState, ...] | None:
@@ -142,20 +167,18 @@ class SurfaceWorker:
         except Exception:
             self._failed("the sensors could not be asked")
             return None
-        degraded = tuple(one.id for one in sensors if one.kind == "radar" and one.status != "ok")
+        degraded = self._impaired(sensors)
         if degraded != self._degraded and self._step(Envelope(self._clock.now(), SensorHealth(degraded))) is not None:
             self._degraded = degraded
         return sensors
 
-    def _tick(self) -> list[Outcome]:
+    def _tick(self, arrival: float, step: float) -> list[Outcome]:
         now, made = time.monotonic(), []
-        step = self._clock.take_step()
         if step:
-            log.warning("the clock of this host was set by %+.1f s; the picture goes on with it", step)
-            made.append(self._step(Envelope(self._clock.now(), ClockStep(step))))
+            made.append(self._step(Envelope(arrival, ClockStep(step))))
         if now - self._ticked >= TICK_S:
             self._ticked = now
-            made.append(self._step(Envelope(self._clock.now(), Tick())))
+            made.append(self._step(Envelope(arrival, Tick())))
         return [one for one in made if one is not None]
 
     def _take(self, waiting: Waiting) -> Outcome | None:
@@ -175,6 +198,8 @@ class SurfaceWorker:
 
     def _step(self, envelope: Envelope) -> Outcome | None:
         """Put one input into the engine; None, counted and logged, when that failed."""
+        if isinstance(envelope.body, ClockStep):
+            log.warning("the clock of this host was set by %+.1f s; the picture goes on with it", envelope.body.seconds)
         try:
             if self._recorder is not None:
                 self._recorder.before(envelope, self.engine.save)

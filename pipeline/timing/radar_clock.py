@@ -39,6 +39,7 @@ class RadarClock:
         self._estimate = OffsetEstimate()
         self._correcting = False
         self._floor = -math.inf
+        self._late = 0.0
         self._before: tuple[float, int, float] | None = None
         self._step: tuple[float, float] | None = None
 
@@ -52,11 +53,16 @@ class RadarClock:
         """How far the offsets of single seconds lie apart, s."""
         return self._estimate.spread
 
+    @property
+    def late(self) -> bool:
+        """The newest sweeps came too late to be of use: the corrected times are behind by more than max_latency_s."""
+        return self._late > self.rules.max_latency_s
+
     def words(self, now: float) -> str:
         """What is wrong with the clock, for a person; empty when nothing is. now: time of arrival, UTC s."""
         if self.rules.mode == "arrival":
             return ""
-        said = []
+        said = [f"video is over {math.floor(self._late)} s late"] if self.late else []
         offset = self.offset
         if offset is not None and abs(offset) > self.rules.max_offset_s:
             cause = guess(offset)
@@ -96,6 +102,7 @@ class RadarClock:
             time = time - self._pull_back(float(time[-1]) - arrival)
         time = np.maximum.accumulate(np.maximum(time, self._floor))
         self._floor = float(time[-1])
+        self._late = arrival - self._floor
         return time
 
     def _jumps(self, stated: Floats, rows: NDArray[np.int64], arrival: float) -> Floats:
@@ -123,8 +130,9 @@ class RadarClock:
         offset = self._estimate.value
         self._correcting = self.rules.corrects(offset, self._correcting) or abs(offset) > self.rules.max_offset_s
         missing = (-offset if self._correcting else 0.0) - self.correction
-        if begins or abs(missing) > self.rules.max_offset_s:
-            self.rebased += abs(missing) > self.rules.max_offset_s
+        at_once = abs(missing) > self.rules.max_offset_s or (self.late and missing > self.rules.max_latency_s)
+        if begins or at_once:
+            self.rebased += at_once
             moved = missing
         else:
             moved = min(max(missing, -SLEW * turned), SLEW * turned)

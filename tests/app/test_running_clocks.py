@@ -21,7 +21,8 @@ from app.runtime.host_clock import HostClock
 from app.service import SurfaceService
 from app.settings import NodeSettings, PartSettings, PartsSettings, RadarSettings, Settings, UdpSettings
 from pipeline.asterix.cat240 import encode_sweeps as encode_datagrams
-from pipeline.picture import SensorState
+from pipeline.picture import AlertChange, Picture, SensorState
+from pipeline.tables import TrackPhase
 from tests.app.runtime.small_radar import AZIMUTHS, RANGES, T0, VIDEO, small_site, turn
 from tests.support.running import until
 from tests.support.small_airport import as_geojson, small_airport
@@ -142,12 +143,81 @@ def test_a_clock_0_7_s_ahead_is_corrected_and_shown(running: Running) -> None:
     assert state.last <= time.time()
 
 
+class Standing:
+    """UTC that goes on when the test says so."""
+
+    now = 1.8e9
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.mark.parametrize("going_on", ["refused", "silent"])
+def test_tracks_coast_and_end_and_alerts_clear_though_nothing_is_accepted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, going_on: str
+) -> None:
+    """An airliner on a closed runway, then only reports of a wrong time, or none; then good ones again."""
+    monkeypatch.setattr("app.runtime.surface_worker.TICK_S", 0.02)
+    monkeypatch.setattr("app.service.SENSOR_SILENT_S", 0.5)
+    clock = Standing()
+    running = Running(tmp_path, clock=HostClock(clock, clock))
+    try:
+        changes: list[AlertChange] = []
+        running.service.listen(lambda _, more: changes.extend(more))
+        latitude, longitude = running.service.airport.frame.to_geodetic(-100.0, 50.0)
+        airliner = {"lat": float(latitude), "lon": float(longitude), "address": "39abcd", "callsign": "AFR12",
+                    "speed_mps": 0.0, "category": "aircraft"}  # fmt: skip
+
+        def picture() -> Picture:
+            made = running.service.picture()
+            assert made is not None
+            return made
+
+        def second(offset: float | None) -> int:
+            """A second passes, with a report at its end; its status."""
+            clock.now += 1.0
+            answer = 0
+            if offset is not None:
+                sent = {**airliner, "time": clock.now + offset}
+                answer = running.ask("POST", "/targets/reports", json=sent).status_code
+            until(lambda: running.time() >= clock.now - 1.0, "time goes on")
+            return answer
+
+        assert running.ask("PUT", "/runways/06/24/state", json={"open": False}).status_code == 200
+        for _ in range(12):
+            assert second(0.0) == 200
+        until(lambda: len(picture().alerts) == 1, "the alert is raised")
+        (alert,) = picture().alerts
+        until(lambda: running.service._running.engine.sensors_degraded, "the reports are called silent")
+        phases = []
+        for _ in range(60):
+            assert second(3600.0 if going_on == "refused" else None) in (0, 422)
+            phases += picture().tracks.phase.tolist()
+        until(lambda: not len(picture().tracks) and not picture().alerts, "track and alert are over")
+        assert TrackPhase.COASTING in phases
+        assert clock.now - 1.0 <= picture().time <= clock.now
+        cleared = changes[-1].alert
+        assert (cleared.id, cleared.clear_reason) == (alert.id, "sensor lost")
+        assert cleared.cleared_at is not None
+        assert clock.now - 60.0 < cleared.cleared_at < clock.now
+        if going_on == "refused":
+            state = running.sensor("reports")
+            assert (state.status, state.counters["taken"], state.counters["refused_ahead"]) == ("degraded", 12, 60)
+        for _ in range(12):
+            assert second(0.0) == 200
+        until(lambda: len(picture().tracks) == 1 and len(picture().alerts) == 1, "it goes on")
+        assert picture().alerts[0].id == alert.id + 1
+    finally:
+        running.service.stop()
+
+
 class Turning(Running):
     """With a radar that is posted to, and a host whose clock goes with its turns."""
 
     def __init__(self, folder: Path) -> None:
-        self.now = T0
-        super().__init__(folder, radar_settings(), clock=HostClock(lambda: self.now, lambda: self.now))
+        self.now, self.host_wrong = T0, 0.0
+        clock = HostClock(lambda: self.now + self.host_wrong, lambda: self.now)
+        super().__init__(folder, radar_settings(), clock=clock)
         self.scan = 0
 
     def turns(self, many: int, wrong: float = 0.0) -> None:
@@ -175,6 +245,7 @@ def test_a_radar_whose_clock_steps_goes_on_and_says_so(tmp_path: Path, step: flo
             assert state.status == "degraded"
             assert f"clock stepped {'+' if (step > 0) == (wrong == step) else '-'}" in state.detail
             assert state.clock_offset_s == pytest.approx(wrong, abs=0.05)
+            assert not running.service._running.engine.sensors_degraded, "what is corrected holds no alert back"
             until(lambda: running.time() > running.now - 0.2, "the picture goes on")
             running.turns(6, wrong)
             assert running.sensor("smr-1").counters["block_failures"] == 0
@@ -184,6 +255,22 @@ def test_a_radar_whose_clock_steps_goes_on_and_says_so(tmp_path: Path, step: flo
         surface = running.service._surface
         assert surface is not None
         assert surface.engine.tracker.counters.get("sector_late", 0) == 0
+    finally:
+        running.service.stop()
+
+
+@pytest.mark.parametrize("step", [3600.0, -3600.0])
+def test_when_the_clock_of_the_host_is_set_the_picture_goes_with_it_once(tmp_path: Path, step: float) -> None:
+    running = Turning(tmp_path)
+    try:
+        running.turns(4)
+        for wrong in (step, 0.0):
+            running.host_wrong = wrong
+            running.turns(4)
+            until(lambda wrong=wrong: abs(running.now + wrong - running.time()) < 0.3, "the picture goes on")
+            counters = running.service._running.engine.counters
+            lost = sum(counters.get(f"sector_{why}", 0) for why in ("late", "ahead"))
+            assert lost <= 2 * 8, "a turn at each step at most"
     finally:
         running.service.stop()
 
@@ -226,5 +313,29 @@ def test_a_leap_second_at_midnight_loses_no_sweep_over_udp(tmp_path: Path) -> No
         assert state.counters["lost"] == state.counters["late"] == state.counters["azimuth_backwards"] == 0
         assert state.last is not None
         until(lambda: abs(running.sensor("smr-1").last - running.service.clock.now()) < 1.5, "near arrival")  # type: ignore[operator]
+    finally:
+        running.service.stop()
+
+
+def test_without_a_radar_silent_reports_make_the_picture_degraded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    running = Running(tmp_path)
+    try:
+        engine = running.service._running.engine
+        path, row = PLACE["reports"]
+        assert running.ask("POST", path, json={**row, "time": time.time()}).status_code == 200
+        until(lambda: running.time() > 0, "the report is taken")
+        assert not engine.sensors_degraded
+        monkeypatch.setattr("app.service.SENSOR_SILENT_S", 0.2)
+        wrong = {**row, "time": time.time() + 3600}
+        until(
+            lambda: running.ask("POST", path, json=wrong).status_code == 422 and engine.sensors_degraded,
+            "nothing was accepted any more",
+        )
+        assert running.sensor("reports").status == "degraded"
+        monkeypatch.setattr("app.service.SENSOR_SILENT_S", 10.0)
+        assert running.ask("POST", path, json={**row, "time": time.time()}).status_code == 200
+        until(lambda: not engine.sensors_degraded, "it is well again")
     finally:
         running.service.stop()

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from app.runtime.clocks import REFUSED_TOLD_S, WORDS_EVERY_S, FeedTimes, RadarTimes
+from app.runtime.clocks import (
+    MOST_SENDERS,
+    REFUSED_TOLD_S,
+    SENDER_KEPT_S,
+    SENDER_SHOWN_S,
+    WORDS_EVERY_S,
+    FeedTimes,
+    RadarTimes,
+)
 from app.runtime.host_clock import HostClock
 from app.settings import ClockSettings
 from pipeline.picture import SensorState
@@ -59,6 +67,56 @@ def test_each_node_has_its_own_clock() -> None:
     assert refused == {"ahead": 1}
     assert why == "B2: time is 18 s ahead of this host: GPS time?"
     assert feed.words() == "B2 1 event ahead 18 s refused: GPS time?"
+
+
+def addressed(address: list[str], *offsets: float, at: float = NOW) -> TargetReports:
+    return TargetReports.build(len(offsets), time=at + np.array(offsets), east=0.0, north=0.0, address=address)
+
+
+def test_a_wrong_clock_of_one_address_does_not_move_the_times_of_the_others() -> None:
+    feed = FeedTimes("report", ClockSettings())
+    for second in range(30):
+        now = NOW + second
+        good, refused, _ = feed.judge(addressed(["39abcd", "39ffff", ""], -0.1, 4.5, -0.2, at=now), now)
+        assert refused == {}
+        assert good.time.tolist() == pytest.approx([now - 0.1, now, now - 0.2])
+    assert feed.shown(state()).clock_offset_s == 4.5
+
+
+def test_who_was_refused_is_said_or_how_many() -> None:
+    steady = Steady()
+    feed = FeedTimes("report", ClockSettings(), steady=steady)
+    _, refused, why = feed.judge(addressed(["39ffff", "39abcd", "39ffff"], 18.0, 0.0, 18.0), NOW)
+    assert refused == {"ahead": 2}
+    assert why == "39ffff: time is 18 s ahead of this host: GPS time?"
+    assert feed.words() == "39ffff 2 reports ahead 18 s refused: GPS time?"
+    steady.now += WORDS_EVERY_S
+    feed.judge(addressed(["39abcd"], 18.0), NOW)
+    assert feed.words() == "3 reports of 2 senders ahead 18 s refused: GPS time?"
+    for _ in range(20):
+        steady.now += WORDS_EVERY_S
+        feed.judge(addressed(["39ffff", "39abcd"], 3600.0, 0.0), NOW)
+    assert feed.words() == "39ffff 22 reports ahead 3,600 s refused: local time?", "39abcd is long since in order"
+
+
+def test_addresses_that_are_gone_are_forgotten_and_made_up_ones_do_not_fill_the_memory() -> None:
+    steady = Steady()
+    feed = FeedTimes("report", ClockSettings(), steady=steady)
+    feed.judge(addressed(["39ffff"], 4.5), NOW)
+    for first in range(0, MOST_SENDERS + 2000, 1000):
+        feed.judge(addressed([f"{first + i:06x}" for i in range(1000)], *[0.0] * 1000), NOW)
+        assert len(feed._senders) <= MOST_SENDERS
+    feed.judge(addressed(["39ffff"], 4.5), NOW)
+    steady.now += SENDER_KEPT_S + 1.0
+    assert feed.shown(state()).clock_offset_s is None
+    feed.judge(addressed(["39ffff"], 4.5), NOW)
+    steady.now += SENDER_SHOWN_S + 1.0
+    feed.judge(addressed(["39abcd"], 0.0), NOW)
+    assert feed.shown(state()).clock_offset_s == 0.0, "what is shown is of those that still speak"
+    events = FeedTimes("event", ClockSettings(), ["A1"], steady=steady)
+    events.judge(NodeEvents.build(1, node=0, time=NOW - 0.5), NOW)
+    steady.now += SENDER_KEPT_S + 1.0
+    assert events.shown(state()).clock_offset_s == -0.5, "a node is rarely passed"
 
 
 def test_a_radar_of_another_year_is_corrected_and_said() -> None:

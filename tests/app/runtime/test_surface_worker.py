@@ -8,6 +8,7 @@ from typing import Any, cast
 import pytest
 
 from app.contract import Refused
+from app.runtime.host_clock import HostClock
 from app.runtime.surface_worker import SurfaceWorker
 from pipeline.engine import Outcome, SurfaceEngine
 from pipeline.inputs import Acknowledge, Envelope, SensorHealth, SetRunway, Tick
@@ -113,3 +114,24 @@ def test_the_engine_hears_when_the_health_of_a_radar_changes_and_only_then() -> 
     until(lambda: len(engine.of(SensorHealth)) == 2, "the engine knows that it is well again")
     made.stop()
     assert engine.of(SensorHealth)[1] == SensorHealth(())
+
+
+def test_a_tick_does_not_overtake_what_came_while_the_thread_was_busy() -> None:
+    now = [1000.0]
+    made, engine = worker(16, clock=HostClock(lambda: now[0], lambda: now[0]))
+    arrivals: list[tuple[float, type[Any]]] = []
+    plain = engine.step
+
+    def slow(envelope: Envelope) -> Outcome:
+        arrivals.append((envelope.arrival, type(envelope.body)))
+        if len(arrivals) == 1:
+            assert made.offer(SensorHealth(("came meanwhile",)))
+            now[0] += 5.0
+        return plain(envelope)
+
+    engine.step = slow  # type: ignore[method-assign]
+    assert made.offer(SensorHealth(("first",)))
+    made.start()
+    until(lambda: any(kind is Tick and at >= 1005.0 for at, kind in arrivals), "ticks go on")
+    made.stop()
+    assert [at for at, _ in arrivals] == sorted(at for at, _ in arrivals)

@@ -126,6 +126,21 @@ def test_a_delay_on_the_way_is_no_step(late: float) -> None:
     assert antenna.clock.rebased == 0
 
 
+def test_video_that_stays_too_late_to_be_of_use_says_so_and_is_brought_near_arrival() -> None:
+    antenna = Antenna()
+    antenna.turn(10)
+    antenna.turn(2, late=3.5)
+    assert antenna.words == "video is over 3 s late"
+    antenna.turn(18, late=3.5)
+    assert (antenna.clock.late, antenna.words) == (False, "")
+    assert antenna.arrival - antenna.got[-1] < 0.1
+    assert antenna.clock.rebased == 1
+    antenna.turn(4)
+    assert antenna.arrival - antenna.got[-1] < 0.1
+    assert np.abs(antenna.turn(1)).max() < AHEAD_LIMIT_S
+    assert antenna.clock.rebased == 1
+
+
 def test_an_outage_is_no_step() -> None:
     antenna = Antenna()
     antenna.turn(5)
