@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -22,7 +24,7 @@ from app.service import SurfaceService
 from app.settings import NodeSettings, PartSettings, PartsSettings, RadarSettings, Settings, UdpSettings
 from pipeline.asterix.cat240 import encode_sweeps as encode_datagrams
 from pipeline.picture import AlertChange, Picture, SensorState
-from pipeline.tables import TrackPhase
+from pipeline.tables import TargetReports, TrackPhase
 from tests.app.runtime.small_radar import AZIMUTHS, RANGES, T0, VIDEO, small_site, turn
 from tests.support.running import until
 from tests.support.small_airport import as_geojson, small_airport
@@ -337,4 +339,27 @@ def test_without_a_radar_silent_reports_make_the_picture_degraded(
         assert running.ask("POST", path, json={**row, "time": time.time()}).status_code == 200
         until(lambda: not engine.sensors_degraded, "it is well again")
     finally:
+        running.service.stop()
+
+
+def test_reports_from_several_threads_are_all_counted(tmp_path: Path) -> None:
+    running = Running(tmp_path)
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        now = running.service.clock.now()
+        one = TargetReports.build(1, time=now, east=0.0, north=0.0, address="39abcd")
+
+        def send() -> None:
+            for _ in range(100):
+                running.service.submit_target_reports(one)
+
+        senders = [threading.Thread(target=send) for _ in range(8)]
+        for sender in senders:
+            sender.start()
+        for sender in senders:
+            sender.join()
+        assert running.sensor("reports").counters["taken"] == 800
+    finally:
+        sys.setswitchinterval(interval)
         running.service.stop()
