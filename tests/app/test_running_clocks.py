@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import socket
 import sys
 import threading
@@ -94,10 +95,10 @@ PLACE = {"reports": ("/targets/reports", {"lat": 48.7233, "lon": 2.3794, "addres
 @pytest.mark.parametrize(
     ("wrong", "reason", "words"),
     [
-        (lambda now: now + 3600.0, "ahead", "3,600 s ahead of this host: local time?"),
+        (lambda now: now + 3600.0, "ahead", r"3,(600|59\d) s ahead of this host: local time\?"),
         (lambda now: YEAR_2099, "ahead", "years ahead of this host"),
-        (lambda now: now + 18.0, "ahead", "18 s ahead of this host: GPS time?"),
-        (lambda now: 4711.0, "behind", "counts from its own start?"),
+        (lambda now: now + 18.0, "ahead", r"1[78] s ahead of this host: GPS time\?"),
+        (lambda now: 4711.0, "behind", r"counts from its own start\?"),
     ],
     ids=["+1 h", "2099", "+18 s", "uptime"],
 )
@@ -109,7 +110,7 @@ def test_one_datum_of_another_time_is_refused_and_changes_nothing_else(
     answer = running.ask("POST", path, json={**row, "time": wrong(now)})
     assert answer.status_code == 422, answer.text
     assert answer.headers["content-type"] == "application/problem+json"
-    assert words in answer.json()["detail"]
+    assert re.search(words, answer.json()["detail"])
     state = running.sensor(kind)
     assert state.status == "degraded"
     assert f"1 {'report' if kind == 'reports' else 'event'} {reason} " in state.detail
