@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.timing.offset import STEP_S, OffsetEstimate
-from pipeline.timing.source_clock import ClockRules, Floats
+from pipeline.timing.source_clock import AHEAD_S, ClockRules, Floats
 from pipeline.timing.words import amount, clock_time, guess, side
 
 SLEW = 0.01
@@ -143,7 +143,8 @@ class RadarClock:
         """Seconds to take off because times ran ahead of their arrival."""
         if self.rules.mode == "taken" and ahead <= self.rules.max_offset_s:
             return 0.0
-        if ahead <= AHEAD_LIMIT_S:
-            return 0.0
+        if ahead <= AHEAD_LIMIT_S:  # but what is corrected too far need not stay ahead
+            too_far = self.correction + (self._estimate.value if self._correcting else 0.0)
+            ahead = min(ahead, too_far) if too_far > 0 and ahead > AHEAD_S else 0.0
         self.correction -= ahead
         return ahead

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import socket
+import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -22,7 +25,7 @@ from app.service import SurfaceService
 from app.settings import NodeSettings, PartSettings, PartsSettings, RadarSettings, Settings, UdpSettings
 from pipeline.asterix.cat240 import encode_sweeps as encode_datagrams
 from pipeline.picture import AlertChange, Picture, SensorState
-from pipeline.tables import TrackPhase
+from pipeline.tables import TargetReports, TrackPhase
 from tests.app.runtime.small_radar import AZIMUTHS, RANGES, T0, VIDEO, small_site, turn
 from tests.support.running import until
 from tests.support.small_airport import as_geojson, small_airport
@@ -92,10 +95,10 @@ PLACE = {"reports": ("/targets/reports", {"lat": 48.7233, "lon": 2.3794, "addres
 @pytest.mark.parametrize(
     ("wrong", "reason", "words"),
     [
-        (lambda now: now + 3600.0, "ahead", "3,600 s ahead of this host: local time?"),
+        (lambda now: now + 3600.0, "ahead", r"3,(600|59\d) s ahead of this host: local time\?"),
         (lambda now: YEAR_2099, "ahead", "years ahead of this host"),
-        (lambda now: now + 18.0, "ahead", "18 s ahead of this host: GPS time?"),
-        (lambda now: 4711.0, "behind", "counts from its own start?"),
+        (lambda now: now + 18.0, "ahead", r"1[78] s ahead of this host: GPS time\?"),
+        (lambda now: 4711.0, "behind", r"counts from its own start\?"),
     ],
     ids=["+1 h", "2099", "+18 s", "uptime"],
 )
@@ -107,7 +110,7 @@ def test_one_datum_of_another_time_is_refused_and_changes_nothing_else(
     answer = running.ask("POST", path, json={**row, "time": wrong(now)})
     assert answer.status_code == 422, answer.text
     assert answer.headers["content-type"] == "application/problem+json"
-    assert words in answer.json()["detail"]
+    assert re.search(words, answer.json()["detail"])
     state = running.sensor(kind)
     assert state.status == "degraded"
     assert f"1 {'report' if kind == 'reports' else 'event'} {reason} " in state.detail
@@ -338,4 +341,27 @@ def test_without_a_radar_silent_reports_make_the_picture_degraded(
         assert running.ask("POST", path, json={**row, "time": time.time()}).status_code == 200
         until(lambda: not engine.sensors_degraded, "it is well again")
     finally:
+        running.service.stop()
+
+
+def test_reports_from_several_threads_are_all_counted(tmp_path: Path) -> None:
+    running = Running(tmp_path)
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        now = running.service.clock.now()
+        one = TargetReports.build(1, time=now, east=0.0, north=0.0, address="39abcd")
+
+        def send() -> None:
+            for _ in range(100):
+                running.service.submit_target_reports(one)
+
+        senders = [threading.Thread(target=send) for _ in range(8)]
+        for sender in senders:
+            sender.start()
+        for sender in senders:
+            sender.join()
+        assert running.sensor("reports").counters["taken"] == 800
+    finally:
+        sys.setswitchinterval(interval)
         running.service.stop()

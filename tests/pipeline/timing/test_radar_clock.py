@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.timing.radar_clock import AHEAD_LIMIT_S, SLEW, TOLD_S, RadarClock
-from pipeline.timing.source_clock import ClockRules
+from pipeline.timing.source_clock import AHEAD_S, ClockRules
 
 NOW = 1.8e9 + 43_384.0
 AZIMUTHS, BLOCKS, PERIOD = 256, 32, 1.0
@@ -139,6 +139,16 @@ def test_video_that_stays_too_late_to_be_of_use_says_so_and_is_brought_near_arri
     assert antenna.arrival - antenna.got[-1] < 0.1
     assert np.abs(antenna.turn(1)).max() < AHEAD_LIMIT_S
     assert antenna.clock.rebased == 1
+
+
+def test_video_that_comes_in_time_again_does_not_stay_ahead() -> None:
+    antenna = Antenna()
+    antenna.turn(10)
+    antenna.turn(20, late=3.5)
+    for late in (0.45, 0.0):
+        antenna.turn(1, late=late)
+    antenna.turn(8)
+    assert np.abs(antenna.turn(1)).max() < AHEAD_S + 0.02
 
 
 def test_an_outage_is_no_step() -> None:
