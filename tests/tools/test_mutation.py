@@ -12,6 +12,8 @@ from tests.tools.mutants import Mutant, mutants
 from tests.tools.mutation import ROOT, document, equivalents, sample
 from tests.tools.mutation_trees import Outcome, Tree, TreeError
 
+pytestmark = pytest.mark.slow
+
 KERNELS = "from pipeline.kernels.compiled import allocating\n"
 FILES = {
     "pyproject.toml": "",
