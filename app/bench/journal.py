@@ -18,6 +18,7 @@ from app.journal.recorder import JournalRecorder
 from app.settings import DemoSettings, JournalSettings, Settings
 from pipeline.engine import SurfaceEngine
 from pipeline.inputs import Envelope, Tick
+from pipeline.lab.measure.picture_quality import QualityRow
 from pipeline.lab.simulate.nodes import NodeSimulator
 from pipeline.lab.simulate.reports import ReportSimulator
 from pipeline.lab.simulate.video import VideoSimulator
@@ -59,6 +60,18 @@ class JournalCost:
     def share(self) -> float:
         """Of a core, in both threads together."""
         return self.surface + self.writer
+
+    def rows(self) -> list[QualityRow]:
+        """The figures, with the bounds that the journal has to keep."""
+        return [
+            QualityRow("surface thread, a picture, without", self.without_us, "us"),
+            QualityRow("surface thread, a picture, with the journal", self.with_us, "us"),
+            QualityRow("added to the surface thread", 100 * self.surface, "% of a core"),
+            QualityRow("the writer's thread", 100 * self.writer, "% of a core"),
+            QualityRow("both", 100 * self.share, "% of a core", 100 * MOST_SHARE),
+            QualityRow("on disk", self.mb_s, "MB/s", MOST_MB_S),
+            QualityRow("records dropped", self.dropped, "", 0),
+        ]
 
 
 @dataclass

@@ -22,6 +22,7 @@ from app.live.hub import Hub
 from app.service import SurfaceService
 from app.settings import Settings, load
 from app.store.store import Store
+from pipeline.lab.measure.picture_quality import QualityRow
 from pipeline.lab.simulate.reports import ReportSimulator
 from pipeline.lab.simulate.video import VideoSimulator
 from pipeline.tables import Sweeps
@@ -41,6 +42,14 @@ class Soak:
     def growth_mib(self) -> float:
         """From a tenth of the way (all is warm) to the end."""
         return self.resident_mib[-1] - self.resident_mib[len(self.resident_mib) // 10]
+
+    def rows(self) -> list[QualityRow]:
+        """The figures; none has a bound."""
+        return [
+            QualityRow("simulated time over real time", self.speed, "times", note=f"{self.minutes} minutes"),
+            QualityRow("memory at the end", self.resident_mib[-1], "MiB"),
+            QualityRow("growth of memory since a tenth of the way", self.growth_mib, "MiB"),
+        ]
 
 
 def soak(minutes: int, folder: Path, progress: Callable[[int], None], turns: int = 60) -> Soak:

@@ -1,24 +1,30 @@
-"""`airside bench`: what each stage costs, next to other libraries; `airside bench picture`: how good the picture is."""
+"""`airside bench`: what each stage costs, next to other libraries; `bench tracker`, `picture`, `soak`, `journal`."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from collections.abc import Sequence
 
-    from pipeline.lab.measure.picture_quality import Score
+    from app.bench.tables import Row
+    from pipeline.lab.measure.picture_quality import QualityRow
+    from pipeline.lab.measure.stopwatch import BenchRow
+
+JsonFile = Annotated[
+    Path | None, typer.Option("--json", metavar="FILE", help='Write the rows as JSON, {"rows": [...]}.')
+]
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
     group = typer.Typer(invoke_without_command=True)
     group.callback()(bench)
-    group.command("picture")(picture)
-    group.command("soak")(soak)
-    group.command("journal")(journal)
+    for command in (tracker, picture, soak, journal):
+        group.command(command.__name__)(command)
     app.add_typer(group, name="bench")
 
 
@@ -28,37 +34,77 @@ def bench(
     peers: Annotated[bool, typer.Option(help="Also measure numpy, scipy and OpenCV on the same input.")] = True,
     service: Annotated[bool, typer.Option(help="Also run the service: intake, delay, clients (two minutes).")] = True,
     seconds: Annotated[float, typer.Option(min=2.0, help="Length of each measurement of the service.")] = 15.0,
+    json: JsonFile = None,
 ) -> None:
     """Measure the stages on this machine, side by side in one run.
 
-    One turn is 4096 x 1024 cells of 8 bits, a second of a 60 rpm radar. Read the ratios: milliseconds depend on what
-    else the machine does.
+    One turn is 4096 x 1024 cells of 8 bits, a second of a 60 rpm radar. Read the ratios, to reading that frame once:
+    milliseconds depend on what else the machine does.
     """
     if context.invoked_subcommand is not None:
+        if json is not None:
+            from app.console import fail
+
+            raise fail(f"--json belongs behind {context.invoked_subcommand}, whose rows it writes")
         return
+    _check(json)
     from rich.console import Console
+
+    from app.bench.tables import figures_table, timed_table
 
     console = Console()
     with console.status("Compiling, or loading compiled kernels ..."):
-        table = _front_end(repeats, peers)
-    console.print(table)
-    with console.status("Tracking a thousand targets ..."):
-        lines = _tracker(peers)
-    console.print("\n".join(lines), highlight=False)
+        front_end = _front_end(repeats, peers)
+    console.print(timed_table("Radar front end, one turn of 4096 x 1024 x 8 bit", front_end))
+    with console.status("Tracking thousands of targets ..."):
+        tracking = _tracker(repeats, peers)
+    console.print(timed_table("Tracker, one turn of 1,000 targets", tracking))
+    served: list[QualityRow] = []
     if service:
-        from app.bench.report import service_table
+        from app.bench.report import service_rows
 
         with console.status("Starting the service ...") as status:
-            table = service_table(seconds, lambda what: status.update(f"Measuring: {what} ..."))
-        console.print(table)
+            served = list(service_rows(seconds, lambda what: status.update(f"Measuring: {what} ...")))
+        console.print(figures_table("The running service", served))
+    _write(json, [*front_end, *tracking, *served])
+
+
+def tracker(
+    turns: Annotated[int, typer.Option(min=30, help="Turns measured; the median is printed.")] = 30,
+    seed: Annotated[int, typer.Option(min=0, help="Of the simulated targets and false plots.")] = 1,
+    json: JsonFile = None,
+) -> None:
+    """Measure the tracker on one thread: 1,000 targets and 180 false plots a turn, and 5,000 at the same density.
+
+    Ratios are to reading a 4 MiB frame once, turn about in the same run; the one of scaling_5000 is to the cost of
+    1,000 targets. What is wanted stands beside what is measured, and a row that does not meet it is no error.
+    """
+    _check(json)
+    from app.threads import one_thread_each
+
+    one_thread_each()
+    import time
+
+    from rich.console import Console
+
+    from app.bench.tables import timed_table
+    from pipeline.lab.measure.bench_tracker import bench_tracker, frames
+    from pipeline.lab.measure.stopwatch import Stopwatch
+
+    console = Console()
+    with console.status("Compiling, or loading compiled kernels; tracking thousands of targets ..."):
+        rows = bench_tracker(Stopwatch(time.perf_counter, turns, frames()), seed=seed)
+    console.print(timed_table(f"Tracker, median of {turns} turns", rows))
+    _write(json, rows)
 
 
 def soak(
     minutes: Annotated[int, typer.Option(min=2, help="Minutes of the demonstration to run.")] = 60,
+    json: JsonFile = None,
 ) -> None:
     """Run the demonstration for an hour of its own time as fast as this machine can; does memory stay flat?"""
+    _check(json)
     import tempfile
-    from pathlib import Path
 
     from rich.console import Console
     from rich.progress import Progress
@@ -73,99 +119,92 @@ def soak(
         f" {result.growth_mib:+.1f} MiB since a tenth of the way",
         highlight=False,
     )
+    _write(json, result.rows())
 
 
 def journal(
     seconds: Annotated[int, typer.Option(min=5, help="Length of the measurement, at the pace of the clock.")] = 60,
     targets: Annotated[int, typer.Option(min=1, help="Targets that move on the airport.")] = 100,
     seed: Annotated[int, typer.Option(min=0, help="Of the simulated world and its radar video.")] = 1,
+    json: JsonFile = None,
 ) -> None:
     """Measure what the journal costs: the same inputs through an engine with a journal and one without, in one run."""
+    _check(json)
     from rich.console import Console
-    from rich.table import Table
 
-    from app.bench.journal import MOST_MB_S, MOST_SHARE, measure_journal
+    from app.bench.journal import measure_journal
+    from app.bench.tables import figures_table
 
     console = Console()
     with console.status("") as status:
         cost = measure_journal(seconds, targets, seed, lambda what: status.update(f"{what} ..."))
     title = f"The journal without raw sweeps, {cost.targets} targets ({cost.tracks:.0f} tracks), {cost.seconds:g} s"
-    table = Table(title=title, title_justify="left")
-    for name in ("figure", "measured", "wanted", ""):
-        table.add_column(name, justify="left" if name in ("figure", "") else "right")
-    table.add_row("surface thread, a picture, without", f"{cost.without_us:.0f}", "", "us")
-    table.add_row("surface thread, a picture, with the journal", f"{cost.with_us:.0f}", "", "us")
-    table.add_row("added to the surface thread", f"{100 * cost.surface:.2f}", "", "% of a core")
-    table.add_row("the writer's thread", f"{100 * cost.writer:.2f}", "", "% of a core")
-    for name, value, most, unit in (
-        ("both", 100 * cost.share, 100 * MOST_SHARE, "% of a core"),
-        ("on disk", cost.mb_s, MOST_MB_S, "MB/s"),
-        ("records dropped", cost.dropped, 0, ""),
-    ):
-        table.add_row(name, f"{value:.3g}", f"<= {most:g}", unit, style=None if value <= most else "red")
-    console.print(table)
-
-
-def _tracker(peers: bool) -> tuple[str, ...]:
-    import time
-
-    from pipeline.lab.measure.bench_tracker import bench_tracker
-
-    return ("Tracker, 1000 targets, one turn", *bench_tracker(time.perf_counter, compare=peers).lines())
+    console.print(figures_table(title, cost.rows()))
+    _write(json, cost.rows())
 
 
 def picture(
     scans: Annotated[int, typer.Option(min=40, help="Turns of the radar to run; the first 30 are not counted.")] = 300,
     seed: Annotated[int, typer.Option(min=0, help="Of the simulated world and its radar video.")] = 1,
+    json: JsonFile = None,
 ) -> None:
     """Run the demonstration's world through radar chain and tracker and compare the picture with the truth.
 
     Bounds are those of EUROCAE ED-87 for the manoeuvring area where it has one: targets, not a certificate.
     """
+    _check(json)
     from rich.console import Console
     from rich.progress import Progress
 
     from app.bench.picture import demo_quality
+    from app.bench.tables import figures_table
 
     with Progress(transient=True) as progress:
         task = progress.add_task("Turns of the radar", total=scans)
         score = demo_quality(scans, lambda scan: progress.update(task, completed=scan + 1), seed=seed)
-    Console().print(_quality(score, f"Picture against truth, {scans} turns, seed {seed}"))
+    rows = score.rows()
+    Console().print(figures_table(f"Picture against truth, {scans} turns, seed {seed}", rows))
+    _write(json, rows)
 
 
-def _quality(score: Score, title: str) -> Table:
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left")
-    for name, side in (("figure", "left"), ("measured", "right"), ("wanted", "right"), ("", "left"), ("", "left")):
-        table.add_column(name, justify="right" if side == "right" else "left", no_wrap=side == "right")
-    for row in score.rows():
-        wanted = "" if row.bound is None else f"{'>=' if row.at_least else '<='} {row.bound:g}"
-        verdict = {True: "met", False: "NOT MET", None: ""}[row.met]
-        style = {True: None, False: "red", None: "dim"}[row.met]
-        table.add_row(row.name, f"{row.value:.4g}", wanted, row.unit, verdict, style=style)
-    return table
-
-
-def _front_end(repeats: int, peers: bool) -> Table:
+def _front_end(repeats: int, peers: bool) -> list[BenchRow]:
     import time
-
-    from rich.table import Table
 
     from pipeline.lab.measure.bench_frontend import bench_frontend
 
-    table = Table(title="Radar front end, one turn of 4096 x 1024 x 8 bit", title_justify="left")
-    figures = ("ms", "least", "x read once", "wanted")
-    for name in ("stage", *figures, ""):
-        table.add_column(name, justify="right" if name in figures else "left", no_wrap=name in figures)
-    for row in bench_frontend(time.perf_counter, repeats, peers):
-        table.add_row(
-            row.name,
-            f"{row.median_s * 1e3:.2f}",
-            f"{row.least_s * 1e3:.2f}",
-            f"{row.ratio:.1f}",
-            row.wanted,
-            row.note,
-            style="dim" if row.peer else None if row.met else "red",
-        )
-    return table
+    return list(bench_frontend(time.perf_counter, repeats, peers))
+
+
+def _tracker(repeats: int, peers: bool) -> list[BenchRow]:
+    import time
+
+    from pipeline.lab.measure.bench_tracker import bench_tracker, frames
+    from pipeline.lab.measure.stopwatch import Stopwatch
+    from pipeline.lab.measure.tracker_parts import bench_tracker_parts
+
+    watch = Stopwatch(time.perf_counter, repeats, frames())
+    return [*bench_tracker(watch), *bench_tracker_parts(watch, peers=peers)]
+
+
+def _check(json: Path | None) -> None:
+    """Before minutes of measuring: can the file be written?"""
+    from app.console import fail
+    from app.output_files import check_writable
+
+    try:
+        if json is not None:
+            check_writable(json)
+    except ValueError as error:
+        raise fail(str(error)) from error
+
+
+def _write(json: Path | None, rows: Sequence[Row]) -> None:
+    if json is None:
+        return
+    from app.bench.tables import write_rows
+    from app.console import fail
+
+    try:
+        write_rows(json, rows)
+    except OSError as error:
+        raise fail(str(error)) from error

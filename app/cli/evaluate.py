@@ -40,7 +40,9 @@ def evaluate(
     [bold]airside evaluate all --quick[/bold] the short version of all. What does not reproduce is printed as such and
     is no error. With --backend dask, DASK_SCHEDULER_ADDRESS names a running cluster; otherwise one is started here.
     """
-    _one_thread_each()
+    from app.threads import one_thread_each
+
+    one_thread_each()
     from app.console import fail
     from app.evaluate.choose import UnknownExperiment
     from app.evaluate.session import Options, run_all, usable_console
@@ -63,11 +65,3 @@ def evaluate(
         raise fail("stopped; nothing is written", code=130) from None
     if failed:
         raise fail(f"could not be carried out: {', '.join(failed)}", code=1)
-
-
-def _one_thread_each() -> None:
-    """Before numpy is imported: sums of several threads would differ from machine to machine."""
-    import os
-
-    for library in ("OMP", "OPENBLAS", "MKL"):
-        os.environ.setdefault(f"{library}_NUM_THREADS", "1")

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import os
-import tempfile
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import Any
 
 from app.evaluate import words
@@ -24,26 +20,6 @@ def document(run: Run) -> dict[str, Any]:
         "settings": words.settings_of(run.experiment),
         "rows": [_row(row) for row in run.rows],
     }
-
-
-def json_text(found: dict[str, Any] | list[dict[str, Any]]) -> str:
-    """Strict JSON, one value a line."""
-    return json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def write_whole(path: Path, text: str) -> None:
-    """Write a file so that it is there whole or not at all. Raises OSError."""
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        umask = os.umask(0)
-        os.umask(umask)
-        Path(name).chmod(0o666 & ~umask)
-        Path(name).replace(path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
 
 
 def markdown(runs: Sequence[Run], left_out: Sequence[str], about: Circumstances) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shlex
 import sys
 from collections.abc import Sequence
@@ -15,10 +14,11 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from app.evaluate.choose import ALL, choose
 from app.evaluate.circumstances import Circumstances, circumstances
-from app.evaluate.documents import document, json_text, markdown, write_whole
+from app.evaluate.documents import document, markdown
 from app.evaluate.recorded import name_of, recorded_video
 from app.evaluate.runs import EvaluationError, Run, carry_out, usable_backend
 from app.evaluate.table import summary, told
+from app.output_files import check_writable, json_text, write_whole
 from pipeline.lab.evaluate import Experiment
 
 PLAIN_WIDTH = 160
@@ -43,12 +43,8 @@ class Options:
     def __post_init__(self) -> None:
         usable_backend(self.backend)
         for path in (self.json, self.markdown):
-            if path is not None and path.is_dir():
-                raise ValueError(f"{path} is a folder; a file is wanted")
-            if path is not None and not path.absolute().parent.is_dir():
-                raise ValueError(f"{path}: its folder does not exist")
-            if path is not None and not os.access(path.absolute().parent, os.W_OK):
-                raise ValueError(f"{path}: its folder cannot be written to")
+            if path is not None:
+                check_writable(path)
         if self.report is not None and self.report.exists() and not self.report.is_dir():
             raise ValueError(f"--report {self.report}: is a file; a folder is wanted")
 

@@ -45,7 +45,8 @@ APRON = (SurfaceKind.APRON, SurfaceKind.ROAD)
 class QualityRow:
     """One line of the result. value: nan when there was nothing to measure. bound: what is wanted, at least or most.
 
-    at_least: the value must not be less than the bound, otherwise not more. unit: "" for a probability.
+    at_least: the value must not be less than the bound, otherwise not more. unit: "" for a probability. note: what was
+    measured, where the name does not say it.
     """
 
     name: str
@@ -53,6 +54,19 @@ class QualityRow:
     unit: str = ""
     bound: float | None = None
     at_least: bool = False
+    note: str = ""
+
+    def document(self) -> dict[str, Any]:
+        """The row as JSON has it; a value that is not finite is None."""
+        return {
+            "name": self.name,
+            "value": self.value if np.isfinite(self.value) else None,
+            "unit": self.unit,
+            "bound": self.bound,
+            "at_least": self.at_least,
+            "met": self.met,
+            "note": self.note,
+        }
 
     @property
     def met(self) -> bool | None:

@@ -1,0 +1,200 @@
+"""Mutation testing of the tracker: do its tests notice when one thing in it is changed?
+
+    python -m tests.tools.mutation --sample 60 --seed 1 --jobs 2 --json mutants.json
+
+takes a seeded sample of single mutations of pipeline/track, filter, associate, lifecycle and group, tries each in a
+copy of the project, and says which were killed and which survived. A survivor is a hole in the tests, or does the same
+as the original: those are set aside by name, with the reason, in tests/tools/equivalent_mutants.toml.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import queue
+import sys
+import tempfile
+import tomllib
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+from app.output_files import check_writable
+from tests.tools.mutants import Mutant, mutants, shuffled
+from tests.tools.mutation_trees import Outcome, Tree, TreeError
+
+ROOT = Path(__file__).resolve().parents[2]
+
+ROOMS = ("track", "filter", "associate", "lifecycle", "group")
+"""Folders of pipeline/ that are mutated."""
+
+TESTS = (*(f"tests/pipeline/{room}" for room in (*ROOMS, "contracts")), "tests/pipeline/test_engine.py")
+
+EQUIVALENT = Path(__file__).with_name("equivalent_mutants.toml")
+
+FIRST_LIMIT_S = 1800.0
+"""For the tests of the unchanged sources, with all kernels to compile."""
+
+LIMIT_FACTOR, COMPILING_S = 5.0, 120.0
+"""A mutant may take so many times as long as the unchanged sources, and so many seconds more to compile."""
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run the command; 0, 1 when fewer were killed than --least wants, 2 when it cannot be done."""
+    options = _parser().parse_args(words)
+    try:
+        every = all_mutants(options.rooms)
+        aside = equivalents(EQUIVALENT)
+        for name in gone(aside):
+            print(f"set aside, but not there any more: {name}", file=sys.stderr)
+        chosen = sample(every, aside, options.seed, options.sample, options.only)
+        if options.list:
+            print("\n".join(one.name for one in chosen))
+            return 0
+        if not chosen:
+            raise ValueError("no mutation has such a name")
+        print(f"{len(chosen)} of {len(every):,} mutations, seed {options.seed}", flush=True)
+        if options.json is not None:
+            check_writable(options.json)
+        outcomes = try_all(chosen, options.jobs)
+    except (TreeError, ValueError, OSError) as error:
+        print(f"mutation: {error}", file=sys.stderr)
+        return 2
+    found = document(outcomes, options.seed)
+    print("\n".join(_summary(outcomes, found)))
+    if options.json is not None:
+        options.json.write_text(json.dumps(found, indent=2, ensure_ascii=False) + "\n")
+    return int(found["share"] < options.least)
+
+
+def all_mutants(rooms: Iterable[str] = ROOMS, root: Path = ROOT) -> list[Mutant]:
+    """Every mutation of these rooms."""
+    files = [path for room in rooms for path in sorted((root / "pipeline" / room).rglob("*.py"))]
+    return [one for path in files for one in mutants(path.relative_to(root).as_posix(), path.read_bytes())]
+
+
+def equivalents(path: Path) -> dict[str, str]:
+    """Names of mutations that change nothing, with the reasons. Raises ValueError for one without a reason."""
+    listed = tomllib.loads(path.read_text()).get("equivalent", [])
+    for one in listed:
+        if not (one.get("name") and str(one.get("reason", "")).strip()):
+            raise ValueError(f"{path.name}: {one.get('name', 'an entry')!r} has no name or no reason")
+    return {one["name"]: one["reason"] for one in listed}
+
+
+def gone(aside: Iterable[str], root: Path = ROOT) -> list[str]:
+    """Names set aside that no mutation bears any more: what they spoke of has changed, and so may the reason have."""
+    listed = list(aside)
+    there = {one.name for one in all_mutants(root=root)} if listed else set()
+    return [name for name in listed if name not in there]
+
+
+def sample(
+    every: Sequence[Mutant], aside: Iterable[str], seed: int, size: int, only: str | None = None
+) -> list[Mutant]:
+    """The first `size` in an order by chance, without those set aside; with `only`, those whose name holds it."""
+    left = set(aside)
+    fit = [one for one in shuffled(every, seed) if one.name not in left and (only is None or only in one.name)]
+    return fit[:size]
+
+
+def tests_for(mutant: Mutant) -> list[str]:
+    """The tests of the mutant's room, then all others."""
+    own = f"tests/{Path(mutant.path).parent.as_posix()}"
+    return sorted(TESTS, key=lambda one: one != own)
+
+
+def try_all(chosen: Sequence[Mutant], jobs: int) -> list[Outcome]:
+    """Try each in one of `jobs` copies of the project and print what became of it; in the order given."""
+    with tempfile.TemporaryDirectory(prefix="airside-mutation-") as folder, ThreadPoolExecutor(jobs) as pool:
+        trees = [Tree(ROOT, Path(folder).resolve() / str(k)) for k in range(jobs)]
+        took = max(pool.map(lambda tree: tree.prove(TESTS, FIRST_LIMIT_S), trees))
+        limit = COMPILING_S + LIMIT_FACTOR * took
+        print(f"unchanged, the tests pass in {took:.0f} s; a mutant may take {limit:.0f} s", flush=True)
+        free = queue.SimpleQueue[Tree]()
+        for tree in trees:
+            free.put(tree)
+
+        def attempt(mutant: Mutant) -> Outcome:
+            tree = free.get()
+            try:
+                return tree.attempt(mutant, tests_for(mutant), limit)
+            finally:
+                free.put(tree)
+
+        waiting = {pool.submit(attempt, one): k for k, one in enumerate(chosen)}
+        outcomes: dict[int, Outcome] = {}
+        try:
+            for done in as_completed(waiting):
+                outcomes[waiting[done]] = done.result()
+                print(_line(done.result()), flush=True)
+        finally:
+            for one in waiting:
+                one.cancel()  # nothing is left to cancel unless something went wrong or a person stopped it
+    return [outcomes[k] for k in range(len(chosen))]
+
+
+def document(outcomes: Sequence[Outcome], seed: int) -> dict[str, Any]:
+    """What became of them, as JSON has it."""
+    killed = sum(one.killed for one in outcomes)
+    return {
+        "seed": seed,
+        "sample": len(outcomes),
+        "killed": killed,
+        "share": killed / len(outcomes),
+        "rows": [
+            {
+                "name": one.mutant.name,
+                "place": f"{one.mutant.path}:{one.mutant.line}",
+                "kind": one.mutant.kind,
+                "before": one.mutant.before,
+                "after": one.mutant.after,
+                "killed": one.killed,
+                "by": one.by,
+                "seconds": round(one.seconds, 1),
+            }
+            for one in outcomes
+        ],
+    }
+
+
+def _line(one: Outcome) -> str:
+    what = f"killed by {one.by}" if one.killed else "SURVIVED"
+    return f"{one.mutant.path}:{one.mutant.line} {_change(one.mutant)}: {what} ({one.seconds:.0f} s)"
+
+
+def _change(mutant: Mutant) -> str:
+    return f"{mutant.function or 'module'}: {mutant.before} -> {mutant.after}"
+
+
+def _summary(outcomes: Sequence[Outcome], found: dict[str, Any]) -> list[str]:
+    survived = [one.mutant for one in outcomes if not one.killed]
+    lines = ["", *(f"survived: {one.name} (line {one.line})" for one in survived)]
+    return [*lines, f"{found['killed']} of {found['sample']} killed, {found['share']:.1%}"]
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        "python -m tests.tools.mutation", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--sample", type=_positive, default=60, help="mutations to try (60)")
+    parser.add_argument("--seed", type=int, default=1, help="of the sample; the same seed takes the same (1)")
+    parser.add_argument("--jobs", type=_positive, default=1, help="copies of the project that work side by side (1)")
+    parser.add_argument("--rooms", nargs="+", choices=ROOMS, default=ROOMS, help="folders of pipeline/ (all five)")
+    parser.add_argument("--only", metavar="TEXT", help="only mutations whose name holds this text")
+    parser.add_argument("--list", action="store_true", help="print the names of the sample and try nothing")
+    parser.add_argument("--least", type=float, default=0.0, help="exit with 1 when a smaller share is killed (0)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write what became of each as JSON")
+    return parser
+
+
+def _positive(word: str) -> int:
+    value = int(word)
+    if value < 1:
+        raise argparse.ArgumentTypeError("must be at least 1")
+    return value
+
+
+if __name__ == "__main__":
+    sys.exit(main())
