@@ -41,7 +41,7 @@ LIMIT_FACTOR, COMPILING_S = 5.0, 120.0
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run the command; 0, 1 when fewer were killed than --least wants, 2 when it cannot be done."""
+    """Run the command; 0, 1 when fewer were killed than --least wants, 2 when it cannot be done, 130 when stopped."""
     options = _parser().parse_args(words)
     try:
         every = all_mutants(options.rooms)
@@ -61,6 +61,9 @@ def main(words: Sequence[str] | None = None) -> int:
     except (TreeError, ValueError, OSError) as error:
         print(f"mutation: {error}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print("mutation: stopped; nothing is written", file=sys.stderr)
+        return 130
     found = document(outcomes, options.seed)
     print("\n".join(_summary(outcomes, found)))
     if options.json is not None:
