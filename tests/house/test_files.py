@@ -62,8 +62,10 @@ def test_the_check_script_is_sound_bash() -> None:
 def test_what_the_readme_points_to_is_there() -> None:
     text = (ROOT / "README.md").read_text()
     pictures = re.findall(r"!\[[^]]+\]\(([^)]+)\)", text)
-    assert len(pictures) == 2
-    assert [one for one in pictures if not (ROOT / one).is_file()] == []
+    assert len(pictures) == 3
+    links = [one for one in re.findall(r"\]\(([^)#]+)\)", text) if "://" not in one]
+    assert set(pictures) | {"docs/journal.md"} <= set(links)
+    assert [one for one in links if not (ROOT / one).is_file()] == []
     given = set(re.findall(r"\b(AIRSIDE_[A-Z0-9_]+)=", text)) - {"AIRSIDE_SETTINGS"}
     assert [one for one in given if not a_setting(one)] == []
 
