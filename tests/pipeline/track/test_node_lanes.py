@@ -149,6 +149,17 @@ def test_a_track_begun_by_a_speed_is_fast_along_its_lane_only(heading: float) ->
         assert tracker.save()["table"]["hits"][0] == 1 + taken
 
 
+@pytest.mark.parametrize("heading", HEADINGS)
+@pytest.mark.parametrize("speed", [10.0, np.nan])
+def test_a_track_begun_by_an_event_is_sure_along_its_lane_and_unsure_across(heading: float, speed: float) -> None:
+    along, right = lane_of(heading)
+    tracker = make_tracker([node(heading)])
+    tracker.node_events(event(0.0, speed=speed))
+    covariance = tracker.save()["table"]["covariance"][0]
+    expected = 2.0**2 * np.outer(along, along) + 6.0**2 * np.outer(right, right)
+    np.testing.assert_allclose(covariance[:2, :2], expected, atol=1e-9)
+
+
 @pytest.mark.parametrize("speed", [-1.0, 120.0, 500.0, np.nan])
 def test_a_speed_that_cannot_be_is_not_believed(speed: float) -> None:
     """The event counts as one without a speed: three plots are needed and not one."""
