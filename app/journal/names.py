@@ -24,6 +24,14 @@ GAP = "gap"
 DISPLAY = "display"
 """Optional topic: the messages of the live feed (JSON text) as they were sent to the displays."""
 
+SETTINGS_FILE, AIRPORT_FILE, VERSIONS_FILE, CLOCK_FILE = (
+    "settings.json",
+    "airport.geojson",
+    "versions.json",
+    "clock.json",
+)
+"""The names of the attachments: all that is needed, besides the records, to run the engine again."""
+
 _NAME = re.compile(r"airside-(\d{8}T\d{6}Z)-([0-9a-f]{8})-(\d{4,})\.mcap")
 
 
