@@ -1,4 +1,4 @@
-"""What the channels of a journal file say about their messages, so that a stranger can decode them."""
+"""What the channels of a journal file say about their messages, so that other programs can decode them."""
 
 from __future__ import annotations
 
