@@ -104,7 +104,7 @@ class ReplayEngine:
                 waiting = None
                 continue
             if waiting is not None and (self._lost or record.topic in (INPUT, SNAPSHOT)):
-                # after records that are missing nobody knows what came of the last input
+                # records are missing: what the live engine made of the last input is not known
                 yield Replayed(waiting[0], waiting[1], None, waiting[2], None, complete=not self._lost)
                 waiting = None
             if record.topic == INPUT and not self._lost:

@@ -21,7 +21,7 @@ from pipeline.picture import AlertChange, Picture, SensorState
 log = logging.getLogger(__name__)
 
 TICK_S = 0.25
-"""Time passes for the engine this often though no sensor speaks, so that ages, coasting and health stay true."""
+"""The engine gets a tick this often, so that tracks coast and ages and health stay true though no sensor speaks."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +134,7 @@ class SurfaceWorker:
             if self._step_due and self.inbox.offer(Waiting(Envelope(now, ClockStep(self._step_due)))):
                 self._step_due = 0.0
             if self._step_due:
-                return False  # without room for the step nothing may pass it; the next tick tells of it
+                return False  # nothing may enter before the step; without room for it the next tick brings it
             return self.inbox.offer(Waiting(Envelope(now, body), answer))
 
     def _run(self) -> None:

@@ -1,4 +1,4 @@
-"""Reads the byte form of nested values (see pipeline.values) with mistrust: octets may come from anywhere."""
+"""Reads the byte form of nested values (`pipeline.values.codec`), all checked: octets may come from anywhere."""
 
 from __future__ import annotations
 
