@@ -22,7 +22,7 @@ class _Timex(ctypes.Structure):
 
 
 def clock_quality() -> dict[str, Any]:
-    """utc, monotonic: s now. synchronised: the clock follows a time source. max_error_s: the bound that the kernel gives.
+    """utc, monotonic: s now. synchronised: the clock follows a time source. max_error_s: the bound of the kernel.
 
     The last two are None where the kernel does not say.
     """

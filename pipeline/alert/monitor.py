@@ -60,7 +60,7 @@ class AlertMonitor:
         geometry: SituationSettings | None = None,
         entry: HoldSettings | None = None,
     ) -> None:
-        """Raise ValueError when `runways` names a runway that the airport has not, or a direction that it has not."""
+        """Raise ValueError when `runways` names a runway, or a direction of one, that the airport does not have."""
         self._airport, self._rules, self._first_id = airport, tuple(rules), first_id
         self._life = life or LifeSettings()
         self._geometry = geometry or SituationSettings()

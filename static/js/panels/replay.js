@@ -78,7 +78,7 @@ export class ReplayBar {
       return;
     }
     if (this.epoch !== this.picture.epoch) {
-      // somebody sought
+      // another client, or this one, moved the replay to another time
       this.epoch = this.picture.epoch;
       this.askedMs = -Infinity;
     }
