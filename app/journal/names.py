@@ -11,10 +11,14 @@ FORMAT_VERSION = "1"
 """Of the journal: its topics, metadata and byte forms."""
 
 PROFILE = "airside"
+"""MCAP profile in the header of each file."""
+
 RUN_METADATA = "airside.run"
 """MCAP metadata in front of the records of a run: run, file, format."""
 
 EXPORT_METADATA = "airside.export"
+"""MCAP metadata at the end of an exported file: from, until, source."""
+
 SNAPSHOT = "snapshot"
 """Topic of the whole state of the engine; every file begins with one."""
 

@@ -26,6 +26,7 @@ SEQUENCES = 2**32
 """Sequence numbers of MCAP are of 32 bits and begin again at 0."""
 
 MEDIA_TYPES = {".json": "application/json", ".geojson": "application/geo+json"}
+"""Of attachments, by the suffix of their names."""
 
 
 def nanoseconds(time: float) -> int:

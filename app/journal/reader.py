@@ -19,8 +19,14 @@ from app.journal.times import utc_text
 from app.journal.walk import Mark, Walk, inner_records
 
 _MESSAGE = struct.Struct("<HIQQ")
+"""Head of a message: channel, sequence, log time and publish time (ns)."""
+
 _INDEX = struct.Struct("<HI")
+"""Head of the index of a chunk: channel, octets of its entries."""
+
 _ENTRY = struct.Struct("<QQ")
+"""Entry of the index: log time (ns), place of the message in the uncompressed chunk."""
+
 _SIZE = struct.Struct("<Q")
 _INNER_HEAD = 9
 """Octets of opcode and length in front of a record in a chunk."""

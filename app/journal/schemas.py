@@ -11,6 +11,7 @@ from pipeline.values import reader as value_reader
 
 MESSAGE_ENCODING = "airside"
 SCHEMA_ENCODING = "airside"
+"""MCAP names for encodings of its own list; others are free, and say here that the byte forms are those of Airside."""
 
 
 @dataclass(frozen=True, slots=True)

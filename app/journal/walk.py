@@ -33,8 +33,14 @@ IN_DATA = frozenset(
         Opcode.ATTACHMENT, Opcode.METADATA, Opcode.DATA_END,
     )
 )  # fmt: skip
+"""Records that may stand in the data section of a file."""
+
 _RECORD = struct.Struct("<BQ")
+"""Head of a record: opcode, length of its content in octets."""
+
 _CHUNK = struct.Struct("<QQQII")
+"""Head of a chunk: first and last log time (ns), uncompressed octets, CRC-32, length of the compression's name."""
+
 _LONG = struct.Struct("<Q")
 
 
