@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -96,7 +96,7 @@ def changed(run: RecordedRun, orders: Sequence[str], *, sweeps: bool) -> Recorde
         place = ".".join(str(one) for one in first["loc"])
         raise SettingsError(f"--set {' '.join(orders)}: {place}: {first['msg']}") from error
     check_parts(settings)
-    return RecordedRun(document, settings, run.airport, run.geojson, run.versions)
+    return replace(run, document=document, settings=settings)
 
 
 def changing(journal: Journal, orders: Sequence[str]) -> Callable[[RecordedRun], RecordedRun]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 
 from rich.console import Console
 
@@ -12,7 +13,7 @@ from app.journal.names import JournalError
 from app.journal.reader import Journal
 from app.live.hub import Hub
 from app.replay.player import JournalPlayer
-from app.replay.recorded import RecordedRun, changing, own_verbs, recorded_run
+from app.replay.recorded import changing, own_verbs, recorded_run
 from app.replay.service import ReplayService
 from app.run import begin_view, make_view, serve
 
@@ -35,9 +36,7 @@ class ReplayRunning:
         run = change(recorded_run(attached, journal.name))
         self.settings = run.settings.model_copy(update={"port": port, "host": "127.0.0.1", "mode": "replay"})
         player = JournalPlayer(journal, change, window, speed, own=own_verbs(orders))
-        self.service = ReplayService(
-            RecordedRun(run.document, self.settings, run.airport, run.geojson, run.versions), player
-        )
+        self.service = ReplayService(replace(run, settings=self.settings), player)
         self.hub = Hub(self.service, self.settings)
         player.begin_anew = self.hub.begin_anew
         self.view3d, view_router = make_view(self.settings, run.airport, player)
