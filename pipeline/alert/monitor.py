@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -13,14 +13,12 @@ import numpy as np
 from pipeline.airport.model import Airport
 from pipeline.airport.runway_frames import HoldFrames, RunwayFrames
 from pipeline.alert.life import Case, LifeSettings, write_alert
-from pipeline.contracts.alert import Conflict, Entry, Situation, SituationSettings
+from pipeline.contracts.alert import AlertRule, Conflict, Entry, Situation, SituationSettings
 from pipeline.picture import Alert, AlertChange, RunwayState, Visibility
 from pipeline.sites import NodeSite
 from pipeline.situation.holds import HoldMemory, HoldSettings, watch_holds
 from pipeline.situation.observe import observe
 from pipeline.tables import NodeEvents, Tracks
-
-Rule = Callable[[Situation], tuple[Conflict, ...]]
 
 
 @dataclass
@@ -51,7 +49,7 @@ class AlertMonitor:
     def __init__(
         self,
         airport: Airport,
-        rules: Sequence[Rule],
+        rules: Sequence[AlertRule],
         first_id: int = 1,
         *,
         nodes: Sequence[NodeSite] = (),
