@@ -60,7 +60,7 @@ def node_site(node: NodeSettings, airport: Airport) -> NodeSite:
 
 
 AHEAD_MARGIN_S = 1.0
-"""The engine refuses what is dated so much further ahead than the judges of the clocks let pass, s."""
+"""The engine refuses what is dated this much further ahead than the clock settings allow: a second line of defence."""
 
 FRONT_END = {"detect": "detector", "extract": "extractor", "bearing": "bearing"}
 """The verbs whose parts work on one radar's video, and what `RadarChain` calls the part."""

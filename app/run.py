@@ -12,6 +12,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any, Protocol
 
 import uvicorn
+from fastapi import APIRouter
 from rich.console import Console
 from rich.logging import RichHandler
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -19,12 +20,13 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from app.airports import load_airport
 from app.api.application import create_app
 from app.bus import connect_bus
-from app.contract import Service
+from app.contract import ReplayControl, Service
 from app.ingest.mqtt import MqttThread
 from app.live.hub import Hub
 from app.service import SurfaceService
 from app.settings import Settings, SettingsError
 from app.store.store import Store
+from pipeline.airport.model import Airport
 
 if TYPE_CHECKING:
     from app.view3d import View3D
@@ -63,13 +65,7 @@ class Running:
             from app.journal.display import DisplayRecorder
 
             DisplayRecorder(self.hub, lambda: self.service.journal, self.service.clock.now)
-        self.view3d: View3D | None = None
-        view_router = None
-        if settings.view3d:
-            from app.view3d import View3D, router
-
-            self.view3d = View3D(airport, settings.mode, replay=self.service.replay)
-            view_router = router(self.view3d, settings)
+        self.view3d, view_router = make_view(settings, airport, self.service.replay)
         self.app = create_app(self.service, hub=self.hub, store=self.store, view3d_router=view_router)
         self._ends = ExitStack()
 
@@ -88,12 +84,9 @@ class Running:
         service.listen(store.record)
         service.listen(self.hub.publish)
         if self.view3d is not None:
-            step("3D view: building the scene")
-            self.view3d.start()
-            self._ends.callback(self.view3d.stop)
             view = self.view3d
+            begin_view(view, service, step, self._ends)
             service.extra_counters["view3d"] = lambda: {f"view3d_{k}": v for k, v in view.counters().items()}
-            service.listen(lambda picture, _changes: view.update(picture))
         try:
             bus = connect_bus(self.settings.bus_url, service)
         except ValueError as error:
@@ -123,6 +116,26 @@ class Running:
         self.service.extra_counters["demo"] = feed.counters
         feed.start()
         self._ends.callback(feed.stop)
+
+
+def make_view(
+    settings: Settings, airport: Airport, replay: ReplayControl | None
+) -> tuple[View3D | None, APIRouter | None]:
+    """The 3D view and its routes, where the settings want it. replay: steers the replay that is shown, if it is one."""
+    if not settings.view3d:
+        return None, None
+    from app.view3d import View3D, router
+
+    view = View3D(airport, settings.mode, replay=replay)
+    return view, router(view, settings)
+
+
+def begin_view(view: View3D, service: Service, step: Callable[[str], None], ends: ExitStack) -> None:
+    """Start a 3D view and show it every picture of the service; `ends` stops it."""
+    step("3D view: building the scene")
+    view.start()
+    ends.callback(view.stop)
+    service.listen(lambda picture, _changes: view.update(picture))
 
 
 def serve(settings: Settings, console: Console, running: Served | None = None) -> int:

@@ -185,7 +185,7 @@ class SurfaceService:
         others = []
         if self.nodes:
             others.append(self._feed_state("nodes", "node", all(node.simulated for node in self.nodes)))
-        if "reports" in self._heard or self._feed_times["reports"].heard:
+        if "reports" in self._heard or self._feed_times["reports"].has_refused:
             others.append(self._feed_state("reports", "report", False))
         return (*radars, *others, self._surface_state(), *(one() for one in self.extra_sensors))
 
@@ -225,7 +225,7 @@ class SurfaceService:
         return VideoRecorder(self._journal.writer, self.clock.now).before
 
     def _parts_changed(self, radar: str, parts: dict[str, Any]) -> None:
-        """For those who read the journal: the engine itself does not mind."""
+        """Note it in the journal; the engine does nothing with it."""
         self._running.offer(PartsChanged(radar, parts))
 
     def _carried_out(self, command: Command, id: int | str) -> Any:

@@ -51,9 +51,11 @@ class ClockSettings(Section):
         "the time of arrival; auto: corrected only when latency cannot explain the offset",
     )
     max_offset_s: float = Field(
-        5.0, gt=0, description="further from the time of arrival it is refused; a radar's is corrected and said"
+        5.0, gt=0, description="a report or event further than this from its arrival is refused; video is corrected"
     )
-    max_latency_s: float = Field(2.0, ge=0, description="so much behind is taken for latency, not for a wrong clock")
+    max_latency_s: float = Field(
+        2.0, ge=0, description="a time behind its arrival by less than this counts as latency, not as a wrong clock"
+    )
 
 
 class ClocksSettings(Section):

@@ -6,7 +6,9 @@ import os
 
 
 def one_thread_each() -> None:
-    """Before numpy is imported: sums of several threads would differ from machine to machine, and measured times mean
-    those of one processor."""
+    """Have numeric libraries use one thread; to be called before numpy is imported.
+
+    Sums of several threads would differ from machine to machine, and measured times are those of one processor.
+    """
     for library in ("OMP", "OPENBLAS", "MKL"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")

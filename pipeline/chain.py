@@ -176,7 +176,7 @@ class RadarChain:
 
     @property
     def expected(self) -> NDArray[np.float64]:
-        """(4, n) what expect() was last given, as far as it is used: east, north, heading, sd."""
+        """(4, n) what expect() was last given, without what is not used: east and north m, heading rad, its sd rad."""
         return (NOTHING_EXPECTED if self._bearings is None else self._bearings.expected).table()
 
     def resume(self, saved: Mapping[str, NDArray[Any]]) -> None:
@@ -371,7 +371,7 @@ def _plain(array: NDArray[Any]) -> NDArray[Any]:
 
 
 def _typed(array: NDArray[Any], wanted: np.dtype[Any] | None) -> NDArray[Any]:
-    """What _plain() was given, whose dtype was `wanted`. Raises StateError when the octets are not so many."""
+    """The inverse of _plain(); wanted: the dtype. Raises StateError when the octets have another size."""
     if wanted is None or wanted.names is None:
         return array
     if array.dtype != np.uint8 or array.ndim < 1 or array.shape[-1] != wanted.itemsize:

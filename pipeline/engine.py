@@ -1,4 +1,4 @@
-"""The surface engine: everything the sensors say goes in, one picture comes out. A value machine without a clock."""
+"""The surface engine: everything the sensors say goes in, one picture comes out. It reads no clock."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from pipeline.sites import NodeSite, RadarSite
 from pipeline.tables import NodeEvents, SectorPlots, TargetReports, Tracks
 
 MOST_AHEAD_S = 6.0
-"""What is dated further after its own arrival is refused: no sensor knows the future. More than the 5 s within which
+"""A measurement dated further after its own arrival is refused. More than the 5 s within which
 the clock of a source is taken as it is (`pipeline.timing`), so that this is a second line of defence."""
 
 LOOK_EVERY_S = 0.025
 """Data time between two pictures: less than a sector of a radar that turns once a second in 32 sectors (0.031 s)."""
 
 SILENCE_S = 1.0
-"""When nothing was accepted for so long, ticks move the time; a radar's sectors come far more often."""
+"""Ticks move the time when no measurement was accepted for this long; a radar's sectors come far more often."""
 
 JITTER_S = 0.5
-"""So far ticks stay behind: what a sensor says next may be as old as this and is still in time."""
+"""Ticks stay this far behind the host's clock, so that a measurement with less latency than this is still in time."""
 
 
 class TrackerLike(Protocol):
@@ -127,7 +127,7 @@ class EngineState:
 
     time: the newest that was accepted. heard: arrival of the newest accepted measurement, and the time it brought.
     looked: time of the newest picture. degraded: ids of radars that are not well. new_node_events: since that picture.
-    refused: measurements refused at the door, by reason.
+    refused: rows refused because they were dated after their arrival, by reason.
     """
 
     time: float = 0.0
@@ -306,7 +306,7 @@ class SurfaceEngine:
             self.advance(heard[1] + arrival - heard[0] - JITTER_S)
 
     def _shift(self, seconds: float) -> None:
-        """Everything remembered moves with the host's clock, so that nothing is lost and nothing seems old or new."""
+        """All remembered times move with the host's clock, so that no track is lost or changes its age."""
         s = self._state
         self.tracker.shift(seconds)
         if s.time:

@@ -26,6 +26,8 @@ from pipeline.picture import SensorState
 from pipeline.tables import Sweeps
 
 START = 1_700_000_000.0
+"""UTC s at which the simulated world begins; any time does, but the same makes the same inputs."""
+
 SETTLE_S = 30
 """Turns before the measurement: the detector learns, and tracks are confirmed."""
 
@@ -33,7 +35,7 @@ BLOCKS = 32
 """Sectors a turn, as a service cuts it."""
 
 LATENCY_S = 0.05
-"""From a sweep to the arrival of its sector."""
+"""From the last sweep of a sector to its arrival."""
 
 MOST_SHARE, MOST_MB_S = 0.03, 1.0
 """What is wanted: of a core, and on disk without raw sweeps."""
@@ -41,7 +43,7 @@ MOST_SHARE, MOST_MB_S = 0.03, 1.0
 
 @dataclass(frozen=True)
 class JournalCost:
-    """Of one run at the pace of the clock. without_us, with_us: processor time of the surface thread for one picture,
+    """One run at the pace of the clock. without_us, with_us: processor time of the surface thread for one picture,
     without and with the journal. surface, writer: shares of a core, of what the journal adds to the surface thread and
     of the writer's thread. mb_s: on disk. dropped: records that found no room."""
 

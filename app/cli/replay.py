@@ -24,21 +24,33 @@ File = Annotated[
 Headless = Annotated[
     bool, typer.Option("--headless", help="Serve and send nothing: print what the engine or the detector makes of it.")
 ]
-Speed = Annotated[float, typer.Option(min=0.01, max=1000, help="So many times the recorded pace.")]
+Speed = Annotated[float, typer.Option(min=0.01, max=1000, help="Times the recorded pace; on the displays 0.1 to 64.")]
 Verify = Annotated[
     bool, typer.Option("--verify", help="Journal, with --headless: compare every bit with what was recorded.")
 ]
-From = Annotated[str | None, typer.Option("--from", metavar="T", help="Journal: not before (ISO 8601, s, or +s).")]
-Until = Annotated[str | None, typer.Option("--until", metavar="T", help="Journal: not after, in the same forms.")]
+From = Annotated[
+    str | None,
+    typer.Option(
+        "--from",
+        metavar="T",
+        help="Journal: not before this time: ISO 8601, epoch seconds, or +90: 90 s after its first record.",
+    ),
+]
+Until = Annotated[
+    str | None, typer.Option("--until", metavar="T", help="Journal: not after this time, in the same forms.")
+]
 Change = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Journal: as in parts.lifecycle=m_of_n.")
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Journal: run with another setting, such as parts.lifecycle=m_of_n."
+    ),
 ]
 HttpPort = Annotated[
     int,
     typer.Option("--http-port", envvar="AIRSIDE_PORT", min=0, max=65535, help="Journal: port of the displays."),
 ]
-Radar = Annotated[str | None, typer.Option(help="Video: the radar of the settings it stands for; the first if none.")]
-To = Annotated[str | None, typer.Option(help="Video: udp://host:port; the radar's own port on this machine if none.")]
+Radar = Annotated[str | None, typer.Option(help="Video: the radar of the settings that it is sent as; else the first.")]
+To = Annotated[str | None, typer.Option(help="Video: udp://host:port; else the radar's own port on this machine.")]
 Loop = Annotated[bool, typer.Option("--loop", help="Video: begin again at the end.")]
 Port = Annotated[int | None, typer.Option(min=1, max=65535, help="Video: take only this UDP port of a capture.")]
 SettingsFile = Annotated[
@@ -137,6 +149,7 @@ def _replay_journal(
     port: int,
 ) -> None:
     from app.console import fail
+    from app.contract import Refused
     from app.journal.names import JournalError
     from app.replay.command import JournalReplay
     from app.settings import SettingsError
@@ -151,7 +164,7 @@ def _replay_journal(
             status = work.compare()
         else:
             status = work.serve(port, speed)
-    except (JournalError, SettingsError, OSError) as error:
+    except (JournalError, Refused, SettingsError, OSError) as error:
         raise fail(str(error)) from error
     except KeyboardInterrupt:
         raise typer.Exit(130) from None

@@ -112,7 +112,6 @@ class DemoFeed:
         self._clock = clock
         self._address = (host, port)
         self._rain = rain
-        self._seed = seed
         self._nodes = NodeSimulator(service.nodes, seed)
         self._reports = ReportSimulator(seed) if reports else None
         self._stop = threading.Event()

@@ -15,15 +15,15 @@ from app.live.messages import DEFAULT_RATE_HZ, Subscribe
 log = logging.getLogger(__name__)
 
 BEGIN_S = 0.1
-"""How often it is looked whether the journal has begun."""
+"""How often the event loop checks whether the journal has begun."""
 
 
 class DisplayRecorder:
     """A client of the feed within the service: tracks, alerts and status go to the journal as they go to a display.
 
     It begins with the event loop of the hub and ends with it. writer: gives the journal, None while there is none. now:
-    UTC s of this host. Every snapshot of the engine is followed by whole messages, so that what is shown can be told
-    from each file alone. It takes a place among the clients of the feed.
+    UTC s of this host. Every snapshot of the engine is followed by whole messages, so that each
+    file alone tells what was shown. It takes a place among the clients of the feed.
     """
 
     def __init__(self, hub: Hub, writer: Callable[[], JournalWriter | None], now: Callable[[], float]) -> None:
@@ -65,7 +65,7 @@ class _Recording(Client):
         """Nobody waits for an answer."""
 
     def wake(self) -> None:
-        """There is something to look at; after a snapshot of the engine, everything."""
+        """There is something to send; after a snapshot of the engine, everything is sent again."""
         taken = self._writer.snapshots_taken
         if taken != self._snapshots:
             self._snapshots = taken

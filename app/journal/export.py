@@ -9,6 +9,7 @@ from pathlib import Path
 from app.journal.names import EXPORT_METADATA, SNAPSHOT, JournalError
 from app.journal.output import JournalOutput
 from app.journal.reader import Journal, JournalFile, Record
+from app.journal.times import utc_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +31,7 @@ def export(journal: Journal, since: float, until: float, target: Path) -> Export
     interval, at damage, and when the file is there already or cannot be written; no half file is left then.
     """
     if until < since:
-        raise JournalError(f"until ({until:.3f}) lies before from ({since:.3f})")
+        raise JournalError(f"until ({utc_text(until)}) lies before from ({utc_text(since)})")
     beside = target.with_name(f".{target.name}.new")
     try:
         if target.exists():
@@ -66,7 +67,7 @@ def _copy(journal: Journal, since: float, until: float, output: JournalOutput, t
         records, last = records + 1, record.order
         first = record.order if first is None else first
     if first is None or last is None:
-        raise JournalError(f"{journal.name}: nothing between {since:.3f} and {until:.3f}")
+        raise JournalError(f"{journal.name}: nothing between {utc_text(since)} and {utc_text(until)}")
     output.metadata(
         EXPORT_METADATA,
         {

@@ -7,13 +7,10 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.journal.names import GAP, JournalError
+from app.journal.names import GAP, VERSIONS_FILE, JournalError
 from app.journal.output import seconds
 from app.journal.reader import Journal, JournalFile
 from pipeline.values import ValueCodec
-
-VERSIONS = "versions.json"
-"""Attachment with the versions of program, Python and packages."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +114,7 @@ def _runs(journal: Journal) -> tuple[dict[str, Any], ...]:
 
 
 def _versions(file: JournalFile, run: str) -> Any:
-    attached = file.attachments(run).get(VERSIONS)
+    attached = file.attachments(run).get(VERSIONS_FILE)
     try:
         return json.loads(attached) if attached is not None else None
     except ValueError:

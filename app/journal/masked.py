@@ -8,6 +8,8 @@ from typing import Any
 from app.settings import Settings
 
 MASK = "***"
+"""What stands in place of a secret."""
+
 _USER_INFO = re.compile(r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*://)[^/?#\s]*@")
 _SECRET_QUERY = re.compile(r"(?i)(?P<key>[?&][^=&#\s]*(?:password|passwd|secret|token|key|auth)[^=&#\s]*=)[^&#\s]*")
 _SECRET_NAME = re.compile(r"(?i)password|passwd|secret|token|credential")

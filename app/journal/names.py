@@ -11,10 +11,14 @@ FORMAT_VERSION = "1"
 """Of the journal: its topics, metadata and byte forms."""
 
 PROFILE = "airside"
+"""MCAP profile in the header of each file."""
+
 RUN_METADATA = "airside.run"
 """MCAP metadata in front of the records of a run: run, file, format."""
 
 EXPORT_METADATA = "airside.export"
+"""MCAP metadata at the end of an exported file: from, until, source."""
+
 SNAPSHOT = "snapshot"
 """Topic of the whole state of the engine; every file begins with one."""
 
@@ -23,6 +27,14 @@ GAP = "gap"
 
 DISPLAY = "display"
 """Optional topic: the messages of the live feed (JSON text) as they were sent to the displays."""
+
+SETTINGS_FILE, AIRPORT_FILE, VERSIONS_FILE, CLOCK_FILE = (
+    "settings.json",
+    "airport.geojson",
+    "versions.json",
+    "clock.json",
+)
+"""The names of the attachments: all that is needed, besides the records, to run the engine again."""
 
 _NAME = re.compile(r"airside-(\d{8}T\d{6}Z)-([0-9a-f]{8})-(\d{4,})\.mcap")
 

@@ -17,11 +17,16 @@ CHUNK_BYTES = 4 * 1024 * 1024
 """Uncompressed octets after which a chunk is closed: two seconds of a busy airport, long enough to compress well."""
 
 NS = 1_000_000_000
+"""Nanoseconds in a second."""
+
 MOST_NS = 2**63 - 1
+"""ns, the greatest time that is written, so that readers may hold it in a signed integer (the year 2262)."""
+
 SEQUENCES = 2**32
 """Sequence numbers of MCAP are of 32 bits and begin again at 0."""
 
-MEDIA_TYPES = {".json": "application/json", ".geojson": "application/geo+json", ".toml": "application/toml"}
+MEDIA_TYPES = {".json": "application/json", ".geojson": "application/geo+json"}
+"""Of attachments, by the suffix of their names."""
 
 
 def nanoseconds(time: float) -> int:

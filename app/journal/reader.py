@@ -15,11 +15,18 @@ from mcap.records import Attachment, Channel, Metadata
 
 from app.journal.names import RUN_METADATA, SNAPSHOT, JournalError, journal_files
 from app.journal.output import nanoseconds, seconds
+from app.journal.times import utc_text
 from app.journal.walk import Mark, Walk, inner_records
 
 _MESSAGE = struct.Struct("<HIQQ")
+"""Head of a message: channel, sequence, log time and publish time (ns)."""
+
 _INDEX = struct.Struct("<HI")
+"""Head of the index of a chunk: channel, octets of its entries."""
+
 _ENTRY = struct.Struct("<QQ")
+"""Entry of the index: log time (ns), place of the message in the uncompressed chunk."""
+
 _SIZE = struct.Struct("<Q")
 _INNER_HEAD = 9
 """Octets of opcode and length in front of a record in a chunk."""
@@ -114,7 +121,7 @@ class JournalFile:
                 yield from self._chunk_records(file, chunk)
 
     def check(self) -> None:
-        """Read every octet and compare with the sums in the file. Raises JournalError naming the place."""
+        """Read every octet and compare with the checksums in the file. Raises JournalError naming the place."""
         self._walk.check()
         for _ in self.records():
             pass
@@ -160,7 +167,7 @@ class JournalFile:
         one = self._walk.parsed(mark, data, Attachment.read)
         (crc,) = struct.unpack("<I", data[-4:])
         if crc and zlib.crc32(data[:-4]) != crc:
-            raise self._walk.damaged(mark.at, f"the attachment {one.name!r}: its sum (CRC) is not that of its octets")
+            raise self._walk.damaged(mark.at, f"the attachment {one.name!r}: its checksum (CRC) is wrong")
         self._attached.setdefault(run, {})[one.name] = one.data
 
     def _index(self, file: BinaryIO, chunk: ChunkIndex, indexes: list[tuple[Mark, bytes]]) -> None:
@@ -263,7 +270,7 @@ class Journal:
             for at, chunk in reversed(self.files[number].snapshots()):
                 if nanoseconds(at) <= wanted:
                     return number, chunk, nanoseconds(at)
-        raise JournalError(f"{self.name}: no snapshot at or before {since:.3f}")
+        raise JournalError(f"{self.name}: no snapshot at or before {utc_text(since)}")
 
     @property
     def name(self) -> str:

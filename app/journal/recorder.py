@@ -10,24 +10,17 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from app.journal.masked import masked
+from app.journal.names import AIRPORT_FILE, CLOCK_FILE, SETTINGS_FILE, VERSIONS_FILE
 from app.journal.writer import JournalWriter
 from app.runtime.clock_quality import clock_quality
 from app.settings import JournalSettings, Settings
 from pipeline.engine import Outcome
-from pipeline.engine_records import CODEC, INPUT, OUTPUT, SENSORS, SNAPSHOT, Shown, shown
+from pipeline.engine_records import CODEC, INPUT, OUTPUT, SENSORS, SNAPSHOT, shown
 from pipeline.inputs import Envelope
 from pipeline.picture import SensorState
 
 SENSORS_EVERY_S = 1.0
 """The health of the sensors is recorded this often, and whenever a status changes."""
-
-SETTINGS_FILE, AIRPORT_FILE, VERSIONS_FILE, CLOCK_FILE = (
-    "settings.json",
-    "airport.geojson",
-    "versions.json",
-    "clock.json",
-)
-"""The names of the attachments: all that is needed, besides the records, to run the engine again."""
 
 
 class JournalRecorder:
@@ -96,12 +89,4 @@ def versions() -> dict[str, str]:
             made[package] = version(package)
         except PackageNotFoundError:
             made[package] = "unknown"
-    return made
-
-
-def decoded_output(data: bytes) -> Shown:
-    """An output record. Raises ValueError when it is none."""
-    made = CODEC.decode(data)
-    if not isinstance(made, Shown):
-        raise ValueError(f"an output record holds a {type(made).__name__}")
     return made

@@ -1,4 +1,4 @@
-"""What the channels of a journal file say about their messages, so that a stranger can decode them."""
+"""What the channels of a journal file say about their messages, so that other programs can decode them."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pipeline.values import reader as value_reader
 
 MESSAGE_ENCODING = "airside"
 SCHEMA_ENCODING = "airside"
+"""MCAP names for encodings of its own list; others are free, and say here that the byte forms are those of Airside."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Moments in a journal as a person writes them."""
+"""Moments in a journal as a person writes and reads them."""
 
 from __future__ import annotations
 
@@ -26,6 +26,16 @@ def moment(text: str, start: float) -> float:
         raise JournalError(
             f"{text!r} is no time: 2026-11-27T11:30:00Z, epoch seconds, or +seconds from the start"
         ) from None
+
+
+def utc_text(time: float | None) -> str:
+    """UTC s as ISO 8601 with milliseconds: "2026-11-27T11:30:00.000Z"; "-" for None, the number if it is no date."""
+    if time is None:
+        return "-"
+    try:
+        return datetime.fromtimestamp(time, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+    except (OverflowError, ValueError, OSError):
+        return f"{time:.3f}"
 
 
 def _finite(value: float) -> float:

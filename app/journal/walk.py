@@ -1,4 +1,4 @@
-"""Walks over the records of an MCAP file with mistrust: knows what is whole, what is cut off and what is damaged."""
+"""Reads the records of an MCAP file and checks each: what is whole, what is cut off and what is damaged."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from app.journal.names import JournalError
 T = TypeVar("T")
 MAGIC = MCAP0_MAGIC
 MOST_CHUNK_BYTES = 2**30
-"""Uncompressed octets of a chunk that are read; ours hold some MB, and one that claims more would fill the memory."""
+"""Octets, the most that a chunk may unpack to: those of Airside hold some MB, and more could fill the memory."""
 
 PRIVATE_OPCODES = range(0x80, 0x100)
 """Records that others may add; they are passed over."""
@@ -33,8 +33,14 @@ IN_DATA = frozenset(
         Opcode.ATTACHMENT, Opcode.METADATA, Opcode.DATA_END,
     )
 )  # fmt: skip
+"""Records that may stand in the data section of a file."""
+
 _RECORD = struct.Struct("<BQ")
+"""Head of a record: opcode, length of its content in octets."""
+
 _CHUNK = struct.Struct("<QQQII")
+"""Head of a chunk: first and last log time (ns), uncompressed octets, CRC-32, length of the compression's name."""
+
 _LONG = struct.Struct("<Q")
 
 
@@ -112,7 +118,7 @@ class Walk:
             raise self.damaged(mark.at, f"a record that cannot be read ({error or type(error).__name__})") from None
 
     def chunk(self, mark: Mark, data: bytes) -> bytes:
-        """The uncompressed octets of a chunk, checked against its sum."""
+        """The uncompressed octets of a chunk, checked against its checksum."""
         try:
             _, _, size, crc, length = _CHUNK.unpack_from(data)
             name_end = _CHUNK.size + length
@@ -125,13 +131,13 @@ class Walk:
         except (struct.error, ValueError, RuntimeError, MemoryError, zstandard.ZstdError) as error:
             raise self.damaged(mark.at, f"a chunk that cannot be unpacked ({error})") from None
         if crc and zlib.crc32(records) != crc:
-            raise self.damaged(mark.at, "a chunk whose sum (CRC) is not that of its octets")
+            raise self.damaged(mark.at, "a chunk whose checksum (CRC) is wrong")
         return records
 
     def check(self) -> None:
-        """Read every octet of the data and compare with the sum at its end. Raises JournalError.
+        """Read every octet of the data and compare with the checksum at its end. Raises JournalError.
 
-        The sum stands only in a finished file; of others each chunk has its own.
+        Only a finished file has one; in others each chunk has its own.
         """
         end = self.marks[-1] if self.marks else None
         if not self.finished or end is None or end.opcode != Opcode.DATA_END:
@@ -148,7 +154,7 @@ class Walk:
                 crc = zlib.crc32(block, crc)
                 at += len(block)
         if wanted and crc != wanted:
-            raise JournalError(f"{self.path}: damaged before octet {end.at}: the sum (CRC) of the data is another")
+            raise JournalError(f"{self.path}: damaged before octet {end.at}: the checksum (CRC) of the data is wrong")
 
 
 def _unpacked(compression: str, packed: bytes, size: int) -> bytes:

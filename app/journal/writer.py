@@ -1,4 +1,4 @@
-"""Writes the journal in a thread of its own; whoever hands it records never waits and never hears of its troubles."""
+"""Writes the journal in a thread of its own: handing over a record never waits and never raises."""
 
 from __future__ import annotations
 
@@ -358,7 +358,7 @@ class JournalWriter:
         output.begin_run(self.run, number, self._attachments, self._utc())
 
     def _remove_old(self) -> None:
-        """Make room for one more file: the oldest go first, those of this run last, and nothing that is not ours."""
+        """Make room for one more file: the oldest go first, those of this run last, and no other files."""
         files = [(parsed(path.name), path) for path in journal_files(self._folder)]
         oldest = sorted((name.run == self.run, name, path) for name, path in files if name is not None)
         sizes = {path: size_of(path) for _, _, path in oldest}
@@ -397,4 +397,4 @@ class JournalWriter:
         try:
             self._on_failure(text)
         except Exception:
-            log.exception("whoever was to hear that the journal has stopped failed")
+            log.exception("the callback for a journal that has stopped failed")

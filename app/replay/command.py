@@ -13,9 +13,9 @@ from rich.table import Table
 from app.journal.names import JournalError, journal_files
 from app.journal.reader import Journal, open_journal
 from app.journal.recorder import versions
-from app.journal.times import moment
+from app.journal.times import moment, utc_text
 from app.replay.compare import compare
-from app.replay.verify import Verification, told, verify
+from app.replay.verify import Verification, verify
 from pipeline.tables import Tracks
 
 
@@ -80,7 +80,7 @@ class JournalReplay:
         for title, alerts in zip(("only recorded", "only replayed"), made.alerts(), strict=True):
             for one in alerts:
                 self.console.print(
-                    f"{title}: {told(one.time)} {one.stage} {one.rule} {one.runway} {', '.join(one.targets)}",
+                    f"{title}: {utc_text(one.time)} {one.stage} {one.rule} {one.runway} {', '.join(one.targets)}",
                     highlight=False,
                 )
         if not any(made.alerts()):
@@ -94,7 +94,7 @@ class JournalReplay:
         return serve_journal(self.console, self.journal, self.change, (self.since, self.until), port, speed)
 
     def _tell(self, found: Verification) -> None:
-        span = "" if found.first is None or found.last is None else f", {told(found.first)} to {told(found.last)}"
+        span = "" if found.first is None else f", {utc_text(found.first)} to {utc_text(found.last)}"
         self.console.print(
             f"{found.inputs} inputs{span}: {found.pictures} pictures of {len(Tracks.columns())} columns"
             f" ({found.columns} columns compared), {found.changes} alert changes, {found.snapshots} snapshots,"

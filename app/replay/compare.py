@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 
 from app.journal.names import JournalError
 from app.journal.reader import Journal, Record
-from app.replay.recorded import RecordedRun, changed, own_verbs
+from app.replay.recorded import changing, own_verbs
 from app.replay.verify import ReplayEngine
-from pipeline.engine_records import SNAPSHOT, SWEEPS
+from pipeline.engine_records import SNAPSHOT
 from pipeline.lab.measure.compare_pictures import PictureComparison
 
 
@@ -24,12 +24,7 @@ def compare(
     Begins from the first snapshot of each run, so that both sides start alike; later snapshots are passed over.
     Raises JournalError when the journal cannot be used, SettingsError for an order that cannot change anything.
     """
-    sweeps = SWEEPS in journal.topics()
-
-    def change(run: RecordedRun) -> RecordedRun:
-        return changed(run, orders, sweeps=sweeps)
-
-    replay, made = ReplayEngine(journal, change, own_verbs(orders)), PictureComparison()
+    replay, made = ReplayEngine(journal, changing(journal, orders), own_verbs(orders)), PictureComparison()
     for one in replay.replayed(since, until):
         if isinstance(one, Record):
             if one.topic == SNAPSHOT and replay.lost:

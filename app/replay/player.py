@@ -12,9 +12,12 @@ from typing import Any
 
 from app.contract import PictureListener, Refused, ReplayState
 from app.journal.names import GAP, JournalError
+from app.journal.output import seconds
 from app.journal.reader import Journal, Record
+from app.journal.times import utc_text
 from app.replay.recorded import RecordedRun
-from app.replay.verify import Replayed, ReplayEngine
+from app.replay.verify import ReplayEngine
+from app.runtime.listeners import Listeners
 from pipeline.engine_records import CODEC, SENSORS, SNAPSHOT, Shown
 from pipeline.picture import AlertChange, Picture, SensorState
 
@@ -24,13 +27,13 @@ SLOWEST, FASTEST = 0.1, 64.0
 """Times the recorded pace."""
 
 STILL_S = 0.5
-"""While it stands still the picture is sent again this often, so that displays know that it is all there is."""
+"""While it stands still the picture is sent again this often, so that the displays do not take the feed for lost."""
 
 LONGEST_PAUSE_S = 3.0
 """A longer time without any record is skipped: no service ran, or its clock was set. Ticks come every 0.25 s."""
 
 CATCH_UP_S = 1.0
-"""When the engine cannot keep the pace, what it is behind by more than this is forgiven."""
+"""An engine that is further behind the pace asked for goes on from where it is, and does not catch up."""
 
 
 @dataclass
@@ -72,7 +75,7 @@ class JournalPlayer:
         self._change, self._own = change, own
         self._wanted = _Wanted(True, _speed(speed), self.begin)
         self._condition = threading.Condition()
-        self._listeners: list[PictureListener] = []
+        self._listeners = Listeners()
         self._ending = False
         self._time = self.begin
         self._gaps = journal_gaps(journal)
@@ -103,15 +106,7 @@ class JournalPlayer:
 
     def listen(self, listener: PictureListener) -> Callable[[], None]:
         """Call `listener` with every picture; returns the function that ends it."""
-        with self._condition:
-            self._listeners.append(listener)
-
-        def end() -> None:
-            with self._condition:
-                if listener in self._listeners:
-                    self._listeners.remove(listener)
-
-        return end
+        return self._listeners.add(listener)
 
     def state(self) -> ReplayState:
         """Where it stands."""
@@ -125,7 +120,9 @@ class JournalPlayer:
     ) -> ReplayState:
         """Play or pause, at another pace, from another time. Raises Refused."""
         if time is not None and not self.begin <= time <= self.end:
-            raise Refused(f"the recording goes from {self.begin:.3f} to {self.end:.3f}, {time:.3f} is outside")
+            raise Refused(
+                f"the recording goes from {utc_text(self.begin)} to {utc_text(self.end)}, {utc_text(time)} is outside"
+            )
         with self._condition:
             wanted = self._wanted
             if playing is not None:
@@ -211,13 +208,7 @@ class JournalPlayer:
 
     def _send(self, picture: Picture, changes: tuple[AlertChange, ...] = ()) -> None:
         self.newest = picture
-        with self._condition:
-            listeners = tuple(self._listeners)
-        for listener in listeners:
-            try:
-                listener(picture, changes)
-            except Exception:
-                log.exception("a listener failed")
+        self._listeners.tell(picture, changes)
 
     def _wait_until(self, at: float, pace: _Pace) -> bool:
         """Wait for the moment at which the recording reaches `at`; False when something else is asked for."""
@@ -283,11 +274,11 @@ def journal_gaps(journal: Journal) -> tuple[float, ...]:
         for chunk in file.chunks:
             if not chunk.messages:
                 continue
-            begin = chunk.messages[0][1] * 1e-9
+            begin = seconds(chunk.messages[0][1])
             if run and chunk.run != run:
                 found.append(begin)
             run = chunk.run
-            found += [at * 1e-9 for channel, at, _ in chunk.messages if file.topic(channel) == GAP]
+            found += [seconds(at) for channel, at, _ in chunk.messages if file.topic(channel) == GAP]
     return tuple(found)
 
 
@@ -295,6 +286,3 @@ def _speed(speed: Any) -> float:
     if not (math.isfinite(speed) and SLOWEST <= speed <= FASTEST):
         raise Refused(f"the speed must lie between {SLOWEST:g} and {FASTEST:g} times the recorded pace")
     return float(speed)
-
-
-__all__ = ["JournalPlayer", "Replayed", "journal_gaps"]

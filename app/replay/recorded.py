@@ -4,26 +4,27 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 from pydantic_settings import PydanticBaseSettingsSource
 
-from app.assembly import check_parts, node_site, radar_site, surface_engine
-from app.journal.names import JournalError
-from app.journal.recorder import AIRPORT_FILE, SETTINGS_FILE, VERSIONS_FILE
+from app.assembly import FRONT_END, check_parts, node_site, radar_site, surface_engine
+from app.journal.names import AIRPORT_FILE, SETTINGS_FILE, VERSIONS_FILE, JournalError
+from app.journal.reader import Journal
 from app.settings import Settings, SettingsError
 from pipeline.airport.geojson import AirportFault, airport_from_geojson
 from pipeline.airport.model import Airport
 from pipeline.engine import SurfaceEngine
+from pipeline.engine_records import SWEEPS
 
 ENGINE_PARTS = ("associate", "filter", "lifecycle", "classify", "alert")
 """The verbs whose parts work on what a journal always holds."""
 
-VIDEO_PARTS = ("detect", "extract", "bearing")
+VIDEO_PARTS = tuple(FRONT_END)
 """The verbs whose parts work on the raw sweeps."""
 
 
@@ -95,7 +96,13 @@ def changed(run: RecordedRun, orders: Sequence[str], *, sweeps: bool) -> Recorde
         place = ".".join(str(one) for one in first["loc"])
         raise SettingsError(f"--set {' '.join(orders)}: {place}: {first['msg']}") from error
     check_parts(settings)
-    return RecordedRun(document, settings, run.airport, run.geojson, run.versions)
+    return replace(run, document=document, settings=settings)
+
+
+def changing(journal: Journal, orders: Sequence[str]) -> Callable[[RecordedRun], RecordedRun]:
+    """`changed` with these orders, for the runs of one journal."""
+    sweeps = SWEEPS in journal.topics()
+    return lambda run: changed(run, orders, sweeps=sweeps)
 
 
 def own_verbs(orders: Sequence[str]) -> frozenset[str]:

@@ -13,6 +13,7 @@ from pipeline.picture import Alert, Picture, RunwayState, SensorState, Visibilit
 from pipeline.tables import NodeEvents, TargetReports
 
 NOT_LIVE = "this is the replay of a recording: what happened cannot be changed"
+"""Why a request that would change something is refused."""
 
 
 class ReplayService:

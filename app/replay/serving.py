@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 from rich.console import Console
 
@@ -13,13 +13,9 @@ from app.journal.names import JournalError
 from app.journal.reader import Journal
 from app.live.hub import Hub
 from app.replay.player import JournalPlayer
-from app.replay.recorded import RecordedRun, changed, own_verbs, recorded_run
+from app.replay.recorded import changing, own_verbs, recorded_run
 from app.replay.service import ReplayService
-from app.run import serve
-from pipeline.engine_records import SWEEPS
-
-if TYPE_CHECKING:
-    from app.view3d import View3D
+from app.run import begin_view, make_view, serve
 
 
 class ReplayRunning:
@@ -33,31 +29,18 @@ class ReplayRunning:
         port: int,
         speed: float,
     ) -> None:
-        sweeps = SWEEPS in journal.topics()
-
-        def change(run: RecordedRun) -> RecordedRun:
-            return changed(run, orders, sweeps=sweeps)
-
+        change = changing(journal, orders)
         attached = next((got for one in journal.files if (got := one.attachments())), None)
         if attached is None:
             raise JournalError(f"{journal.name}: no settings and no map in it")
         run = change(recorded_run(attached, journal.name))
         self.settings = run.settings.model_copy(update={"port": port, "host": "127.0.0.1", "mode": "replay"})
         player = JournalPlayer(journal, change, window, speed, own=own_verbs(orders))
-        self.service = ReplayService(
-            RecordedRun(run.document, self.settings, run.airport, run.geojson, run.versions), player
-        )
+        self.service = ReplayService(replace(run, settings=self.settings), player)
         self.hub = Hub(self.service, self.settings)
         player.begin_anew = self.hub.begin_anew
-        self.view3d: View3D | None = None
-        router = None
-        if self.settings.view3d:
-            from app.view3d import View3D
-            from app.view3d import router as view_router
-
-            self.view3d = View3D(run.airport, "replay", replay=player)
-            router = view_router(self.view3d, self.settings)
-        self.app = create_app(self.service, hub=self.hub, store=None, view3d_router=router)
+        self.view3d, view_router = make_view(self.settings, run.airport, player)
+        self.app = create_app(self.service, hub=self.hub, store=None, view3d_router=view_router)
         self._ends = ExitStack()
 
     def begin(self, step: Callable[[str], None]) -> None:
@@ -65,11 +48,7 @@ class ReplayRunning:
         service = self.service
         service.listen(self.hub.publish)
         if self.view3d is not None:
-            step("3D view: building the scene")
-            self.view3d.start()
-            self._ends.callback(self.view3d.stop)
-            view = self.view3d
-            service.listen(lambda picture, _changes: view.update(picture))
+            begin_view(self.view3d, service, step, self._ends)
         step("journal: finding the first picture")
         service.player.start()
         self._ends.callback(service.player.stop)

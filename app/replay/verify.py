@@ -5,11 +5,12 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
 from typing import TypeVar
 
 from app.journal.names import GAP, SNAPSHOT, JournalError
+from app.journal.output import SEQUENCES
 from app.journal.reader import Journal, Record
+from app.journal.times import utc_text
 from app.replay.recorded import RecordedRun, recorded_run
 from app.replay.video import VideoReplay
 from pipeline.engine import SurfaceEngine
@@ -21,7 +22,6 @@ from pipeline.values import first_difference
 log = logging.getLogger(__name__)
 
 T = TypeVar("T")
-SEQUENCE_MODULO = 2**32
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,6 @@ class ReplayEngine:
         self.video: VideoReplay | None = None
         self._own = own
         self.engine: SurfaceEngine | None = None
-        self.run: RecordedRun | None = None
         self.counts = Verification()
         self._change = change
         self._id = ""
@@ -105,7 +104,7 @@ class ReplayEngine:
                 waiting = None
                 continue
             if waiting is not None and (self._lost or record.topic in (INPUT, SNAPSHOT)):
-                # after records that are missing nobody knows what came of the last input
+                # records are missing: what the live engine made of the last input is not known
                 yield Replayed(waiting[0], waiting[1], None, waiting[2], None, complete=not self._lost)
                 waiting = None
             if record.topic == INPUT and not self._lost:
@@ -123,7 +122,7 @@ class ReplayEngine:
         try:
             self.engine.restore(CODEC.decode(snapshot.data))
         except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise JournalError(f"{self.journal.name}: the snapshot at {told(snapshot.time)}: {error}") from error
+            raise JournalError(f"{self.journal.name}: the snapshot at {utc_text(snapshot.time)}: {error}") from error
         self._lost = False
 
     @property
@@ -134,7 +133,7 @@ class ReplayEngine:
     def _follow(self, record: Record) -> None:
         if record.run != self._id:
             self._begin_run(record.run)
-        elif self._sequence is not None and record.sequence != (self._sequence + 1) % SEQUENCE_MODULO:
+        elif self._sequence is not None and record.sequence != (self._sequence + 1) % SEQUENCES:
             self._lose()
         self._sequence = record.sequence
         if record.topic == GAP:
@@ -149,7 +148,7 @@ class ReplayEngine:
         if self._own:
             return replace(envelope, body=made)
         if CODEC.encode(made) != CODEC.encode(recorded):
-            self.detection_difference = f"plots at {told(record.time)}: {first_difference(recorded, made)}"
+            self.detection_difference = f"plots at {utc_text(record.time)}: {first_difference(recorded, made)}"
         return envelope
 
     def _lose(self) -> None:
@@ -165,17 +164,18 @@ class ReplayEngine:
             if not isinstance(made, kind):
                 raise ValueError(f"it is a {type(made).__name__}, where a {kind.__name__} is wanted")
         except ValueError as error:
-            raise JournalError(f"{self.journal.name}: the {record.topic} at {told(record.time)}: {error}") from error
+            at = utc_text(record.time)
+            raise JournalError(f"{self.journal.name}: the {record.topic} at {at}: {error}") from error
         return made
 
     def _begin_run(self, id: str) -> None:
         self._id, self._lost, self._sequence = id, True, None
         attached = next((got for one in self.journal.files if (got := one.attachments(id))), {})
-        self.run = self._change(recorded_run(attached, self.journal.name))
-        self.engine = self.run.engine()
-        self.video = VideoReplay(self.run, self._own)
+        run = self._change(recorded_run(attached, self.journal.name))
+        self.engine = run.engine()
+        self.video = VideoReplay(run, self._own)
         self.counts.runs += 1
-        self.counts.versions = self.run.versions
+        self.counts.versions = run.versions
 
     def _step(self, record: Record) -> tuple[Record, Envelope, Shown | None]:
         assert self.engine is not None
@@ -188,7 +188,7 @@ class ReplayEngine:
         except Exception:
             # the live engine failed at the same place, and went on
             self.counts.failures += 1
-            log.debug("the engine could not take the input at %s", told(record.time), exc_info=True)
+            log.debug("the engine could not take the input at %s", utc_text(record.time), exc_info=True)
             made = None
         return record, envelope, made
 
@@ -219,11 +219,6 @@ def verify(
     return counts
 
 
-def told(time: float) -> str:
-    """A moment for a person: UTC with milliseconds."""
-    return datetime.fromtimestamp(time, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
-
-
 def _compared(one: Replayed, counts: Verification) -> str | None:
     if not one.complete:
         return None
@@ -233,7 +228,7 @@ def _compared(one: Replayed, counts: Verification) -> str | None:
             counts.pictures += one.made.time == one.made.time
             counts.changes += len(one.made.changes)
         return None
-    place = f"input {one.record.sequence} ({type(one.envelope.body).__name__}) at {told(one.record.time)}"
+    place = f"input {one.record.sequence} ({type(one.envelope.body).__name__}) at {utc_text(one.record.time)}"
     if one.recorded is None or one.made is None:
         which = "recorded" if one.made is None else "replayed"
         return f"{place}: only the {which} engine made a picture of it"
@@ -251,4 +246,4 @@ def _at_snapshot(replay: ReplayEngine, snapshot: Record) -> str | None:
     if CODEC.encode(reached) == snapshot.data:
         return None
     found = first_difference(CODEC.decode(snapshot.data), reached) or "the octets differ, the values do not"
-    return f"snapshot {snapshot.sequence} at {told(snapshot.time)}: {found}"
+    return f"snapshot {snapshot.sequence} at {utc_text(snapshot.time)}: {found}"

@@ -37,7 +37,7 @@ class VideoReplay:
         self._made: dict[tuple[int, int, float], list[SectorPlots]] = {}
 
     def take(self, record: Record) -> None:
-        """Take a record of sweeps or of a chain's state; others are none of its business. Raises JournalError."""
+        """Take a record of sweeps or of a chain's state; other topics are ignored. Raises JournalError."""
         if record.topic not in (SWEEPS, CHAIN):
             return
         try:

@@ -7,6 +7,7 @@ import time
 from typing import Any
 
 _STA_UNSYNC = 0x0040
+"""Bit of the status in struct timex: the clock follows no time source (linux/timex.h)."""
 
 
 class _Timex(ctypes.Structure):
@@ -21,7 +22,10 @@ class _Timex(ctypes.Structure):
 
 
 def clock_quality() -> dict[str, Any]:
-    """synchronised: the clock follows a time source, None where the kernel does not say. max_error_s: its own bound."""
+    """utc, monotonic: s now. synchronised: the clock follows a time source. max_error_s: the bound of the kernel.
+
+    The last two are None where the kernel does not say.
+    """
     made: dict[str, Any] = {
         "utc": time.time(),
         "monotonic": time.monotonic(),

@@ -1,4 +1,4 @@
-"""The clocks of all sources of the service: what is done to the times that come in, and what is said of it."""
+"""The clocks of all sources of the service: corrects or refuses the times that come in, and says what was done."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from pipeline.timing.radar_clock import RadarClock
 from pipeline.timing.source_clock import ClockRules, SourceClock
 
 REFUSED_TOLD_S = 30.0
-"""A source is called degraded for so long after it was refused something."""
+"""A source stays degraded this long after a row of it was refused."""
 
 WORDS_EVERY_S = 2.0
-"""The figures in the words change at most this often: every new word is stored and sent."""
+"""The text of a status changes at most this often: every change is stored and sent to all clients."""
 
 SENDER_KEPT_S = 60.0
 """The clock of an address is forgotten when it has not been heard for so long: twice what its estimate looks back."""
@@ -79,8 +79,9 @@ class RadarTimes:
 
 @dataclass(slots=True)
 class _Sender:
-    """One sender's clock. heard: steady s of its newest row. refused_at: of the newest that was refused, and refused:
-    how many were since it last was in order for REFUSED_TOLD_S."""
+    """One sender's clock. heard, refused_at: steady s of its newest row, and of its newest refused row. refused: rows
+    refused since it was last in order for REFUSED_TOLD_S.
+    """
 
     clock: SourceClock
     heard: float = 0.0
@@ -158,7 +159,7 @@ class FeedTimes:
         return _shown(state, worst.offset, worst.spread, counts)
 
     @property
-    def heard(self) -> bool:
+    def has_refused(self) -> bool:
         """Something was refused since the start."""
         return bool(self._refused)
 

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 
 WINDOW_S = 10.0
-"""A cut is told of for so long."""
+"""The status names a cut for this long after it."""
 
 WORDS_EVERY_S = 2.0
 """The figures in the words change at most this often: every new word is stored and sent."""

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 from app.contract import PictureListener, Refused
 from app.runtime.host_clock import HostClock
+from app.runtime.listeners import Listeners
 from app.runtime.queues import Closed, Inbox
 from pipeline.engine import Outcome, SurfaceEngine
 from pipeline.inputs import ClockStep, Command, Envelope, Input, SensorHealth, Tick
@@ -20,7 +21,7 @@ from pipeline.picture import AlertChange, Picture, SensorState
 log = logging.getLogger(__name__)
 
 TICK_S = 0.25
-"""Time passes for the engine this often though no sensor speaks, so that ages, coasting and health stay true."""
+"""The engine gets a tick this often, so that tracks coast and ages and health stay true though no sensor speaks."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +79,7 @@ class SurfaceWorker:
         self._impaired = impaired
         self._timings = timings
         self._expect = expect
-        self._listeners: list[PictureListener] = []
-        self._listening = threading.Lock()
+        self._listeners = Listeners()
         self._thread = threading.Thread(target=self._run, name="surface", daemon=True)
         self._degraded: tuple[str, ...] = ()
         self._ticked = 0.0
@@ -103,15 +103,7 @@ class SurfaceWorker:
 
     def listen(self, listener: PictureListener) -> Callable[[], None]:
         """Call `listener` with every picture; returns the function that ends it."""
-        with self._listening:
-            self._listeners.append(listener)
-
-        def end() -> None:
-            with self._listening:
-                if listener in self._listeners:
-                    self._listeners.remove(listener)
-
-        return end
+        return self._listeners.add(listener)
 
     def offer(self, body: Input) -> bool:
         """Give the engine an input, stamped with the time of now. False, counted, when the queue is full."""
@@ -142,7 +134,7 @@ class SurfaceWorker:
             if self._step_due and self.inbox.offer(Waiting(Envelope(now, ClockStep(self._step_due)))):
                 self._step_due = 0.0
             if self._step_due:
-                return False  # without room for the step nothing may pass it; the next tick tells of it
+                return False  # nothing may enter before the step; without room for it the next tick brings it
             return self.inbox.offer(Waiting(Envelope(now, body), answer))
 
     def _run(self) -> None:
@@ -226,13 +218,7 @@ class SurfaceWorker:
             self._expect(picture)
         except Exception:
             self._failed("the radars could not be told what to expect")
-        with self._listening:
-            listeners = tuple(self._listeners)
-        for listener in listeners:
-            try:
-                listener(picture, changes)
-            except Exception:
-                self._failed("a listener failed")
+        self.failures += self._listeners.tell(picture, changes)
 
     def _failed(self, what: str) -> None:
         self.failures += 1

@@ -152,7 +152,7 @@ def walk_outward(
         for other_point, step in lanes.neighbours[point]:
             if other_point not in access.length:
                 heapq.heappush(queue, (0.0 if at_runway[other_point] else length + step, other_point, point))
-    _leave_lanes_alongside(lanes, access, width, away)
+    _leave_lanes_alongside(access, width, away)
     access.inside |= at_runway | at_other  # a lane on the pavement of a runway that crosses is not outside
     return access
 
@@ -164,7 +164,7 @@ def _alongside(lanes: Lanes, access: Access, point: int, along: NDArray[np.float
     return length > 30.0 and abs(float(chord @ along)) > math.cos(PARALLEL) * length
 
 
-def _leave_lanes_alongside(lanes: Lanes, access: Access, width: float, away: NDArray[np.float64]) -> None:
+def _leave_lanes_alongside(access: Access, width: float, away: NDArray[np.float64]) -> None:
     """The lane alongside was noticed late: give back what was walked of it, and the turn into it."""
     for place, (point, reason) in enumerate(access.crossings):
         if reason != "alongside":

@@ -65,7 +65,6 @@ class HoldEntry(RuleSettings):
                 self._conflict(
                     s,
                     r,
-                    row,
                     entry,
                     tracks=track_numbers(s, row, int(other)),
                     stage=stage,
@@ -85,7 +84,6 @@ class HoldEntry(RuleSettings):
                 self._conflict(
                     s,
                     r,
-                    row,
                     entry,
                     tracks=track_numbers(s, row),
                     stage="information",
@@ -111,7 +109,7 @@ class HoldEntry(RuleSettings):
         return (-speed + float(np.sqrt(speed * speed + 2 * a * gap))) / a if a > 0 else gap / max(speed, 0.5)
 
     @staticmethod
-    def _conflict(s: Situation, r: int, row: int, entry: Entry, **rest: Any) -> Conflict:
+    def _conflict(s: Situation, r: int, entry: Entry, **rest: Any) -> Conflict:
         return Conflict(
             rule="hold_entry",
             runway=s.frames.ids[r],

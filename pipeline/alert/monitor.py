@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -13,14 +13,12 @@ import numpy as np
 from pipeline.airport.model import Airport
 from pipeline.airport.runway_frames import HoldFrames, RunwayFrames
 from pipeline.alert.life import Case, LifeSettings, write_alert
-from pipeline.contracts.alert import Conflict, Entry, Situation, SituationSettings
+from pipeline.contracts.alert import AlertRule, Conflict, Entry, Situation, SituationSettings
 from pipeline.picture import Alert, AlertChange, RunwayState, Visibility
 from pipeline.sites import NodeSite
 from pipeline.situation.holds import HoldMemory, HoldSettings, watch_holds
 from pipeline.situation.observe import observe
 from pipeline.tables import NodeEvents, Tracks
-
-Rule = Callable[[Situation], tuple[Conflict, ...]]
 
 
 @dataclass
@@ -51,7 +49,7 @@ class AlertMonitor:
     def __init__(
         self,
         airport: Airport,
-        rules: Sequence[Rule],
+        rules: Sequence[AlertRule],
         first_id: int = 1,
         *,
         nodes: Sequence[NodeSite] = (),
@@ -60,7 +58,7 @@ class AlertMonitor:
         geometry: SituationSettings | None = None,
         entry: HoldSettings | None = None,
     ) -> None:
-        """Raise ValueError when `runways` names a runway that the airport has not, or a direction that it has not."""
+        """Raise ValueError when `runways` names a runway, or a direction of one, that the airport does not have."""
         self._airport, self._rules, self._first_id = airport, tuple(rules), first_id
         self._life = life or LifeSettings()
         self._geometry = geometry or SituationSettings()

@@ -70,9 +70,6 @@ _FIXED = {1: 2, 2: 1, 3: 4, 5: 12, 6: 12, 7: 2, 8: 5, 12: 3}
 _REPEATED = {4: 1, 9: 4, 10: 64, 11: 256}
 """FRN -> octets of one repetition; a REP octet goes before."""
 
-_LENGTHED = {13, 14}
-"""FRN of RE and SP, whose first octet is their length including itself."""
-
 _NAMES = {
     1: "010", 2: "000", 3: "020", 4: "030", 5: "040", 6: "041", 7: "048", 8: "049", 9: "050", 10: "051", 11: "052",
     12: "140", 13: "RE", 14: "SP",

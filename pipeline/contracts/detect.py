@@ -20,32 +20,18 @@ Rules, tested by `tests.pipeline.contracts.detect.DetectorContract`:
 * Bits past the last range cell are 0. Any cell count and azimuth count.
 * A flood of false alarms is bounded by a cap on runs a turn; where it bites, `Detections.degraded` is set and the rows
   are counted, sweep by sweep, whatever the block size.
-* The state keeps only arrays; `save()` and `restore()` carry it over a restart, and the bits that follow are the same.
+* The state keeps only arrays; `save()` (copies by name) and `restore()` (raises StateError for what does not fit) carry
+  it over a restart, and the bits that follow are the same. Its `counters` tell what happened, by reason, and only grow.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.tables import Detections, Sweeps, VideoFormat
-
-
-class PartState(Protocol):
-    """What the state of any front-end part offers."""
-
-    def save(self) -> dict[str, NDArray[Any]]:
-        """Copies of all remembered arrays by name."""
-
-    def restore(self, saved: Mapping[str, NDArray[Any]]) -> None:
-        """Take up a saved state. Raises StateError when it does not fit."""
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """What happened since start, by reason; they only grow."""
 
 
 class Detector(Protocol):

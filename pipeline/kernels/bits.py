@@ -58,19 +58,6 @@ def bits_above_raised(typing: Any, cells: Any, limits: Any, raised: Any) -> Any:
 
 
 @intrinsic
-def bits_above_lowered(typing: Any, cells: Any, limits: Any, lower: Any) -> Any:
-    """As bits_above, with the 64 bytes at address `lower` taken off the limits (a limit below 0 stays 0)."""
-
-    def build(context: Any, builder: Any, signature: Any, words: Any) -> Any:
-        x, limit, less = (_load(builder, one, _BYTES) for one in words)
-        under = builder.icmp_unsigned("<", limit, less)
-        low = builder.select(under, ir.Constant(_BYTES, [0] * 64), builder.sub(limit, less))
-        return builder.bitcast(builder.icmp_unsigned(">", x, low), ir.IntType(64))
-
-    return types.uint64(types.uintp, types.uintp, types.uintp), build
-
-
-@intrinsic
 def add_pairs(typing: Any, cells: Any, sums: Any) -> Any:
     """Add the 64 bytes at address `cells`, two neighbours together, to the 32 uint16 at address `sums` (128 times at
     most)."""

@@ -20,6 +20,21 @@ from pipeline.tables import Source, TargetClass, TrackPhase, Tracks
 
 Array = NDArray[Any]
 
+CERTAIN_HITS, CERTAIN_SD_M = 5, 12.0
+"""A confirmed track with so many measurements whose position has a smaller standard deviation is certain."""
+
+STRIP_END_MARGIN_M = 30.0
+"""The strip is longer than its pavement by this at either end."""
+
+LEAST_CLOSING_SPEED = 1e-3
+"""m/s; a slower target is taken for this fast where the time to the threshold is computed."""
+
+CREEPING_SPEED = 3.0
+"""m/s; a target that is not faster is not predicted to enter a runway: it can stop within a length of its own."""
+
+OUTBOUND_DIVISOR = 3
+"""A departure is followed beyond the far end for the distance at which arrivals are looked for, divided by this."""
+
 
 def observe(
     airport: Airport,
@@ -58,10 +73,10 @@ def observe(
         speed=mobiles.speed,
         sd=mobiles.sd,
         usable=mobiles.usable,
-        certain=(tracks.phase == TrackPhase.CONFIRMED) & (tracks.hits >= 5) & (mobiles.sd < 12.0),
+        certain=(tracks.phase == TrackPhase.CONFIRMED) & (tracks.hits >= CERTAIN_HITS) & (mobiles.sd < CERTAIN_SD_M),
         landed=np.isin(tracks.id, list(landed)),
         **motion._asdict(),
-        time_to_threshold=motion.distance_to_threshold / np.maximum(np.abs(motion.speed_along), 1e-3),
+        time_to_threshold=motion.distance_to_threshold / np.maximum(np.abs(motion.speed_along), LEAST_CLOSING_SPEED),
         depth=depth,
         vacating=vacating,
         occupant=able & inside & ~vacating & ~flying,
@@ -124,7 +139,8 @@ def _motion(frames: RunwayFrames, mobiles: _Mobiles, s: SituationSettings) -> _M
     speed_along, speed_across = frames.resolve(mobiles.velocity)
     way = (speed_along < 0).astype(np.int8)
     length, half = frames.length[:, None], frames.half_width[:, None]
-    on_strip = (along >= -30) & (along <= length + 30) & (np.abs(across) <= half + s.strip_margin_m)
+    beside_centre = np.abs(across) <= half + s.strip_margin_m
+    on_strip = (along >= -STRIP_END_MARGIN_M) & (along <= length + STRIP_END_MARGIN_M) & beside_centre
     remaining = np.where(way == 0, frames.threshold[:, :1] - along, along - frames.threshold[:, 1:])
     corridor = half + s.corridor_m + np.abs(remaining) * np.tan(np.radians(s.corridor_deg))
     on_course = _aligned(speed_along, speed_across, s.arrival_alignment_deg) & (np.abs(across) <= corridor)
@@ -144,7 +160,7 @@ def _motion(frames: RunwayFrames, mobiles: _Mobiles, s: SituationSettings) -> _M
         arrival=arrival,
         distance_to_threshold=np.where(arrival, remaining, np.nan),
         rolling=on_runway & along_runway,
-        outbound=fast & on_course & ~on_strip & (beyond > 0) & (beyond < s.final_m / 3),
+        outbound=fast & on_course & ~on_strip & (beyond > 0) & (beyond < s.final_m / OUTBOUND_DIVISOR),
     )
 
 
@@ -169,7 +185,7 @@ def _entering(
 ) -> Array:
     position, velocity, speed = mobiles.position, mobiles.velocity, mobiles.speed
     entering = np.zeros(depth.shape, bool)
-    rows = np.nonzero(able & (speed > 3.0) & (speed < s.arrival_speed))[0]
+    rows = np.nonzero(able & (speed > CREEPING_SPEED) & (speed < s.arrival_speed))[0]
     if not len(rows):
         return entering
     stop = position[rows] + velocity[rows] * (speed[rows, None] / (2 * s.braking))

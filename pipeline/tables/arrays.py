@@ -11,5 +11,4 @@ Array = NDArray[Any]
 """An array whose docstring says its dtype and shape."""
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]

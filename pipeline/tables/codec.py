@@ -28,6 +28,8 @@ Octets = bytes | bytearray | memoryview
 
 MAGIC = b"ATBL"
 VERSION = 1
+"""The first octets of every table, and the version of the byte form."""
+
 ALIGNMENT = 8
 """Octets; the greatest item of a column is 8 octets, so that columns can be used where they lie."""
 

@@ -6,8 +6,8 @@ import math
 from collections import deque
 
 WINDOW_S = 30.0
-"""So far back the estimate looks: long enough to meet a datum with little latency, short enough to follow a clock that
-drifts by 50 ppm within 2 ms."""
+"""Length of data that the estimate rests on: long enough to meet a datum with little latency, short enough to follow a
+clock that drifts by 50 ppm within 2 ms."""
 
 QUANTILE = 0.75
 """Of the greatest offset in each second: high, because latency only makes offsets smaller; not the highest, so that one
@@ -17,10 +17,10 @@ STEP_S = 0.5
 """A smaller change of the offset is jitter of the network, not a step of the clock."""
 
 THREADS_S = 1
-"""Threads that take data at the same time may come here in another order than it arrived (s)."""
+"""s. Data taken by several threads at the same time may come here this much out of order."""
 
 AHEAD_SECONDS, BEHIND_SECONDS = 3, 10
-"""Seconds that must agree on a step. No latency makes a clock run ahead; it may well fall behind for some seconds."""
+"""Whole seconds in a row that must show a step. Latency never makes a clock seem ahead, but for some seconds behind."""
 
 
 class OffsetEstimate:

@@ -15,13 +15,13 @@ SLEW = 0.01
 """Small corrections come in at this rate (s/s): what it adds to the speed of a target is below what is measured."""
 
 AHEAD_LIMIT_S = 0.5
-"""A corrected time is never further ahead of its arrival than this: no slewing is waited for then."""
+"""A corrected time is never further ahead of its arrival than this: what is more is taken off at once, not slewed."""
 
 HOST_BACK_S = 1.0
-"""When arrival itself runs back by more than this (s), the host's clock was set, and the radar's times go with it."""
+"""When arrival itself runs back by more than this, the host's clock was set, and the radar's times follow it."""
 
 TOLD_S = 30.0
-"""A step is told of for so long."""
+"""The status names a step of the clock for this long after it."""
 
 
 class RadarClock:

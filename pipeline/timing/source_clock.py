@@ -16,10 +16,11 @@ Floats = NDArray[np.float64]
 ClockMode = Literal["auto", "taken", "corrected", "arrival"]
 
 AHEAD_S = 0.1
-"""Nothing arrives before it was measured; so much is granted to two clocks that are both kept by NTP."""
+"""Nothing arrives before it was measured, but two clocks that are both kept by NTP may differ by this much."""
 
-LEAVE = 0.5
-"""A correction ends when the offset is back within half of what began it, so that it does not come and go."""
+END_FRACTION = 0.5
+"""A correction ends when the offset is back within this fraction of the limit that began it, so that it does not come
+and go."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +40,7 @@ class ClockRules:
         """Whether an estimated offset (s) is to be removed. corrected: whether it is removed already."""
         if self.mode != "auto":
             return self.mode == "corrected"
-        part = LEAVE if corrected else 1.0
+        part = END_FRACTION if corrected else 1.0
         return offset > part * AHEAD_S or offset < -part * self.max_latency_s
 
 

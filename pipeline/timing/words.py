@@ -5,28 +5,31 @@ from __future__ import annotations
 import math
 
 LOCAL_STEP_S = 900.0
-"""Zones of the world differ from UTC by whole quarters of an hour,"""
+"""Time zones differ from UTC by whole quarters of an hour."""
 
 LOCAL_MOST_S = 14 * 3600.0
-"""at most by so much (s)."""
+"""No time zone differs from UTC by more."""
 
 LOCAL_TOLERANCE_S = 10.0
-"""A clock in local time is itself off by less than this (s)."""
+"""An offset this near to that of a time zone is taken for local time: the clock itself may be off by so much."""
 
 GPS_S, TAI_S = 18.0, 37.0
-"""GPS time and international atomic time are so far ahead of UTC since 2017 (s)."""
+"""GPS time and international atomic time have been this much ahead of UTC since 2017."""
 
 SCALE_TOLERANCE_S = 1.0
-"""A clock that counts GPS time or TAI is itself off by less than this (s)."""
+"""An offset this near to that of GPS time or TAI is taken for it: the clock itself may be off by so much."""
 
 OWN_START_S = 1e9
-"""Before September 2001: no sensor has a time like that, so it counts from when it was switched on."""
+"""UTC s (September 2001). A clock that states less counts from when its sensor was switched on."""
 
 DAY_S, YEAR_S = 86400.0, 365.2425 * 86400.0
+"""A day, and the mean year of the calendar."""
+
 MOST_YEARS = 10_000
-"""More is not told exactly."""
+"""A greater offset is given as "over 10,000 years"."""
 
 UNITS = ((1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds"))
+"""Counts of a second in units that are mistaken for seconds, and their names."""
 
 
 def amount(offset: float) -> str:

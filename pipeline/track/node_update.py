@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pipeline.tables import NodeEventKind, NodeEvents, Source, TrackPhase
-from pipeline.tables.arrays import Array, Floats
+from pipeline.tables.arrays import Floats
 from pipeline.track.core import Core, apply_positions, start_tracks, update_lifecycle
 
 LEAST_SPEED = 0.5
@@ -73,7 +73,7 @@ def _apply_event(core: Core, events: NodeEvents, event: int) -> None:
     cost = cost + np.where(table.phase[:n] == TrackPhase.TENTATIVE, core.settings.measurement.tentative_penalty, 0.0)
     if close.any():
         best = int(np.argmin(np.where(close, cost, np.inf)))
-        _update_track(core, best, time, position[best], noise[best], events.simulated[event])
+        _update_track(core, best, time, position[best], noise[best])
         return
     _start(core, events, event, time, lane)
 
@@ -108,7 +108,7 @@ def _squared(off: Floats, spread: Floats) -> Floats:
     return np.asarray(top / det)
 
 
-def _update_track(core: Core, row: int, time: float, position: Floats, noise: Floats, simulated: Array) -> None:
+def _update_track(core: Core, row: int, time: float, position: Floats, noise: Floats) -> None:
     table = core.table
     tentative = table.phase[row] == TrackPhase.TENTATIVE
     rows = np.array([row])

@@ -81,7 +81,7 @@ def _take_round(core: Core, reports: TargetReports) -> None:
     fits = _fits(core, reports, row)
     _apply(core, reports[fits], row[fits])
     lost = np.flatnonzero((row >= 0) & ~fits)
-    moved = _reject(core, reports[lost], row[lost])
+    moved = _reject(core, row[lost])
     named = (reports.address != "") & (row < 0)
     named[lost[moved]] = True
     _identify(core, reports[named])
@@ -117,8 +117,8 @@ def _fits(core: Core, reports: TargetReports, row: Array) -> Array:
     return np.asarray(made)
 
 
-def _reject(core: Core, reports: TargetReports, row: Array) -> Array:
-    """Count reports that do not fit the track of their address; the mask of those whose address leaves it."""
+def _reject(core: Core, row: Array) -> Array:
+    """Count reports that do not fit the track (row) of their address; the mask of those whose address leaves it."""
     table = core.table
     table.misfit_reports[row] += 1
     moved = table.misfit_reports[row] >= core.settings.identity.patience

@@ -26,7 +26,10 @@ from pipeline.track.settings import TrackerSettings
 from pipeline.track.table import NEVER
 
 _SAME = ("id", "phase", "updated", "born", "hits", "misses", "altitude", "on_ground", "category", "address", "callsign")
+"""Columns that the table of tracks handed out has as they are in the track table."""
+
 _SAVED = ("numbers", "clocks", "waiting", "false_plots", "undecided", "time", "lifecycle_time", "maintenance_time")
+"""Attributes of `Core` that are saved besides the track table and the counters."""
 
 
 class Tracker:

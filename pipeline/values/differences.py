@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from pipeline.tables.schema import Table
 
 RECORDED, REPLAYED = "recorded", "replayed"
+"""What a message calls the first and the second value."""
+
 LONGEST = 200
 """Characters of a value that a message shows."""
 

@@ -1,4 +1,4 @@
-"""Reads the byte form of nested values (see pipeline.values) with mistrust: octets may come from anywhere."""
+"""Reads the byte form of nested values (`pipeline.values.codec`), all checked: octets may come from anywhere."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ from pipeline.tables.schema import Table
 
 MAGIC = b"AVAL"
 VERSION = 1
+"""The first octets of every value, and the version of the byte form."""
+
 DTYPE = re.compile(r"[<>|](b1|[iu][1248]|f[248]|c(8|16)|[SUV][1-9]\d{0,8}|[mM]8(\[\w+\])?)")
 """Plain items only: no objects, no records, nothing whose size depends on the machine."""
 
@@ -25,12 +27,17 @@ MOST_DIMENSIONS = 32
 
 HEAD = struct.Struct("<4sHH")
 CLASS = struct.Struct("<IH")
+"""Magic, version, number of classes; of each class: reference, octets of its description."""
+
 COUNT = struct.Struct("<I")
 LONG = struct.Struct("<Q")
 INT = struct.Struct("<cq")
 FLOAT = struct.Struct("<cd")
 TAGGED = struct.Struct("<cI")
+"""Counts and references, and values behind the octet that says their kind; see `pipeline.values.codec`."""
+
 INT64 = (-(2**63), 2**63 - 1)
+"""The least and the greatest number that is stored in 8 octets."""
 
 
 class ValueReader:

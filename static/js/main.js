@@ -206,7 +206,7 @@ function refresh() {
     () => processing.update(nowMs),
     () => target.update(display.selected, display.following),
     () => {
-      // a replay that stands still does not call
+      // no alert sounds while a replay is paused
       const live = picture.pace === 0 ? [] : picture.liveAlerts();
       sound.update(live, needsAttention, nowMs);
       byId('sound').classList.toggle('is-wanted', !sound.armed && live.some(needsAttention));
@@ -261,7 +261,7 @@ feed.start();
 setInterval(refresh, PANELS_EVERY_MS);
 loadAirport();
 fetchCleared().then((past) => {
-  // what a replay has not come to yet is not over
+  // alerts cleared later in the recording have not happened yet at the time shown
   if (picture.mode === 'replay') return;
   for (const alert of past.reverse()) if (!picture.alerts.has(alert.id)) picture.clear(alert);
 }).catch(() => {});

@@ -25,7 +25,7 @@ from tests.support.small_airport import small_airport
 
 NODE = NodeSite("N1", -1450.0, -560.0, 2.6, hold="hold-w1")
 LATENCY_S = 0.1
-"""So much later than it is dated everything arrives."""
+"""Every input arrives this long after the time that it is dated."""
 
 
 def make_engine(radars: int = 1) -> SurfaceEngine:

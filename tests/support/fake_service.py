@@ -258,7 +258,7 @@ class FakeService:
         others = (
             self._times["nodes"].shown(SensorState("nodes", "node", "ok", now, True, counters={"taken": 7 + events})),
         )
-        if reports or self._times["reports"].heard:
+        if reports or self._times["reports"].has_refused:
             others += (self._times["reports"].shown(heard),)
         return (
             SensorState(

@@ -200,7 +200,7 @@ class PictureScorer:
         if time < self._from:
             return
         self.score.seconds += 1
-        self._false(tracks, near, time)
+        self._false(tracks, near)
         self._targets(tracks, truth, away, target, time)
 
     def _follow(self, truth: Truth, time: float) -> None:
@@ -230,7 +230,7 @@ class PictureScorer:
         target = np.where((away <= reach).any(axis=1), np.argmin(away / reach, axis=1), -1) if n else np.zeros(0, int)
         return near, away, target
 
-    def _false(self, tracks: Tracks, near: Array, time: float) -> None:
+    def _false(self, tracks: Tracks, near: Array) -> None:
         score = self.score
         score.reports += len(tracks)
         paved = np.isin(self._zones.kind(tracks.state[:, 0], tracks.state[:, 1]), MANOEUVRING + APRON)

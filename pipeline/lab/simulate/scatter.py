@@ -16,9 +16,6 @@ from numpy.typing import NDArray
 from pipeline.reference.types import NAMES, TYPES, TargetType
 from pipeline.tables import TargetClass
 
-COLUMNS = 6
-"""Columns of a centre: forward m, right m, up m, cross section m^2, bearing of its best aspect rad, narrowness."""
-
 Floats = NDArray[np.float64]
 
 

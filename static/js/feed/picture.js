@@ -36,9 +36,9 @@ export class PictureState {
     /** local clock when it came */
     this.timeMs = -Infinity;
     this.mode = 'live';
-    /** seconds of the picture in a second here: 1 but in a replay, 0 while that is paused */
+    /** seconds of picture time in a second of this clock: 1 unless a replay has another speed, 0 while it is paused */
     this.pace = 1;
-    /** local clock since when it has been so */
+    /** local clock when the pace was set */
     this.paceMs = -Infinity;
     this.airport = '';
     /** true once a snapshot of this epoch is in */
@@ -88,7 +88,7 @@ export class PictureState {
     }
   }
 
-  /** The replay was set to another time: nothing of before is true any more. @param {string} epoch */
+  /** The replay was set to another time: all targets and alerts shown so far are void. @param {string} epoch */
   begin(epoch) {
     this.epoch = epoch;
     this.complete = false;

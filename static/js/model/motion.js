@@ -70,7 +70,7 @@ function age(track, pictureTime) {
 /**
  * Where the target is shown at `nowMs`.
  * @param {Target} target @param {number} nowMs
- * @param {number} [pace] seconds of the picture in a second here: 1 but in a replay, 0 while that is paused
+ * @param {number} [pace] seconds of picture time in a second of this clock: 1 unless a replay has another speed, 0 while it is paused
  * @returns {[number, number]} m
  */
 export function positionAt(target, nowMs, pace = 1) {

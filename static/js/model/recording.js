@@ -10,7 +10,7 @@ export function usable(state) {
   return Boolean(state) && [state.begin, state.end, state.time, state.speed].every(Number.isFinite) && state.end >= state.begin && state.speed > 0;
 }
 
-/** @param {ReplayState} state @returns {number} seconds of the recording in a second here; 0 when it stands still */
+/** @param {ReplayState} state @returns {number} seconds of the recording in a second of this clock; 0 when it stands still */
 export const paceOf = (state) => (state.playing && state.time < state.end ? state.speed : 0);
 
 /**

@@ -7,8 +7,11 @@ import { byId, el, keyed, setText } from './dom.js';
 
 /** @typedef {import('../types.js').ReplayState} ReplayState */
 
+/** How often the service is asked where the replay stands. */
 const POLL_MS = 500;
+/** Words REPLAY over the picture: three columns of four. */
 const WATERMARKS = 12;
+/** A space as wide as a figure. */
 const FIGURE_SPACE = '\u2007';
 /** The picture's own time is shown unless it is this far (s of the recording, at the recorded pace) from where the replay stands. */
 const APART_S = 3;
@@ -78,7 +81,7 @@ export class ReplayBar {
       return;
     }
     if (this.epoch !== this.picture.epoch) {
-      // somebody sought
+      // another client, or this one, moved the replay to another time
       this.epoch = this.picture.epoch;
       this.askedMs = -Infinity;
     }
@@ -110,7 +113,7 @@ export class ReplayBar {
     setText(byId('replay-begin'), clock(state.begin));
     setText(byId('replay-end'), clock(state.end));
     const whole = span(state.end - state.begin);
-    // of one width, or the line would change its length under the pointer
+    // padded to one width, or the slider would change its length under the pointer
     setText(byId('replay-done'), `${span(time - state.begin).padStart(whole.length, FIGURE_SPACE)} / ${whole}`);
     this.speeds.forEach((button, i) => button.setAttribute('aria-pressed', String(SPEEDS[i] === state.speed)));
     for (const [key, value] of /** @type {['min'|'max', number][]} */ ([['min', state.begin], ['max', state.end]])) {
@@ -155,7 +158,7 @@ export class ReplayBar {
       const state = await fetchReplay();
       if (number === this.number) this.take(state);
     } catch {
-      // the next question may be answered; that the service is gone is told by the feed
+      // asked again soon; the feed shows when the service is gone
     }
   }
 
@@ -172,7 +175,7 @@ export class ReplayBar {
   async steer(order) {
     this.number += 1;
     const number = this.number;
-    // shown at once; what the service answers holds
+    // shown at once, until the service answers
     if (this.state) this.take({ ...this.state, time: timeAt(this.state, this.answeredMs, performance.now()), ...order });
     try {
       const state = await steerReplay(order);

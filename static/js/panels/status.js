@@ -10,7 +10,7 @@ const FAULT_FRAMES = 5;
 /**
  * @param {number} nowMs @param {number} lastMessageMs @param {number} lastPictureMs local clock of the newest tracks
  * @param {number} periodS @param {number} startMs local clock when the page began to wait
- * @param {number} pace seconds of the picture in a second here; 0 while a replay is paused, which then sends no tracks
+ * @param {number} pace seconds of picture time in a second of this clock; 0 while a replay is paused, which then sends no tracks
  * @param {number} paceMs local clock since when it has been so
  * @returns {Health} lost: nothing at all for twice the period (2 s at least); late: messages come, but no new tracks
  */

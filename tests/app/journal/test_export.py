@@ -104,7 +104,12 @@ def test_the_commands(tmp_path: Path) -> None:
     assert (document["records"], len(document["snapshots"])) == (16, 2)
     shown = run.invoke(app, ["journal", "info", str(folder), "--check"])
     assert shown.exit_code == 0, shown.output
-    for word in ("run ffffffff: 2 files, 20 records", "3 snapshots, 0 gaps", "airside 0.1.0", "all sums are right"):
+    for word in (
+        "run ffffffff: 2 files, 20 records",
+        "3 snapshots, 0 gaps",
+        "airside 0.1.0",
+        "all checksums are right",
+    ):
         assert word in shown.output
 
 

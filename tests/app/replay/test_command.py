@@ -134,6 +134,7 @@ WRONG = [
     (without_map, "a.mcap: the attachment 'airport.geojson' is missing"),
     (without_snapshot, "a.mcap: no snapshot in it, so that nothing can be replayed"),
     (lambda folder, day: [day, "--verify"], "--verify goes with --headless, and not with --set"),
+    (lambda folder, day: [day, "--speed", "0.05"], "the speed must lie between 0.1 and 64"),
     (
         lambda folder, day: [day, "--headless", "--verify", "--set", "parts.lifecycle=m_of_n"],
         "--verify goes with --headless, and not with --set",
@@ -222,6 +223,6 @@ def test_a_setting_of_a_part_is_changed_alone_or_after_its_part(day: Path) -> No
 def test_info_says_what_there_is_to_replay(day: Path) -> None:
     done = CliRunner().invoke(app, ["journal", "info", str(day), "--check"], env=WIDE)
     assert done.exit_code == 0
-    assert "all sums are right" in done.stdout
+    assert "all checksums are right" in done.stdout
     count = sum(one.topic == "input" for one in open_journal(day).records())
     assert any(one.split()[:2] == ["input", str(count)] for one in done.stdout.splitlines())
