@@ -12,6 +12,7 @@ import pytest
 from tests.static.conftest import Screen
 from tests.static.serving import Serving
 from tests.support.fake_replay import BEGIN, LENGTH_S, FakeReplay
+from tests.support.fake_traffic import synthetic_tracks
 from tests.support.running import until
 
 pytestmark = pytest.mark.browser
@@ -131,7 +132,8 @@ def test_seeking_back_shows_the_picture_of_then_and_nothing_of_before(
     assert screen.ask("counts().cleared") == 0, f"alert {alert.id} has not been raised yet"
     screen.until(f"airside.position() && airside.position().epoch !== {epoch!r}")
     screen.until(f"Math.abs(airside.time() - {BEGIN + 590}) < 0.01")
-    tracks = replaying.service.tracks_at(590.0, BEGIN + 590)
+    service = replaying.service
+    tracks = synthetic_tracks(service.movers, service.airport, BEGIN, BEGIN + 590)
     first = "airside.positions().find((one) => one.id === 1)"
     east, north = tracks.state[0, 0], tracks.state[0, 1]
     screen.until(f"Math.hypot({first}.e - {east}, {first}.n - {north}) < 1")
