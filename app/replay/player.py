@@ -143,10 +143,10 @@ class JournalPlayer:
             except Exception as error:
                 if not isinstance(error, JournalError):
                     log.exception("the replay failed")
-                self.failed = str(error) or type(error).__name__
-                log.error("the replay stands still: %s", error)
                 with self._condition:
                     self._wanted.playing = False
+                    self.failed = str(error) or type(error).__name__
+                log.error("the replay stands still: %s", error)
                 self._stand_still()
 
     def _play(self) -> None:

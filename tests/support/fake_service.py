@@ -104,7 +104,7 @@ class FakeService:
         self._thread: threading.Thread | None = None
         self._began = 0.0 if replay is None else replay.begin
         self._rng = np.random.default_rng(seed)
-        self._movers = self._populate(targets)
+        self.movers = self._populate(targets)
         if replay is not None:
             replay.on_seek.append(self._wind)
 
@@ -139,7 +139,7 @@ class FakeService:
         now = self.clock() if now is None else now
         with self._lock:
             self._began = self._began or now
-            tracks = synthetic_tracks(self._movers, self.airport, self._began, now)
+            tracks = synthetic_tracks(self.movers, self.airport, self._began, now)
             self._script_alert(tracks, now)
             picture = Picture(
                 time=now,
