@@ -192,16 +192,23 @@ class SurfaceWorker:
         """Put one input into the engine; None, counted and logged, when that failed."""
         if isinstance(envelope.body, ClockStep):
             log.warning("the clock of this host was set by %+.1f s; the picture goes on with it", envelope.body.seconds)
+        self._record(lambda recorder: recorder.before(envelope, self.engine.save))
         try:
-            if self._recorder is not None:
-                self._recorder.before(envelope, self.engine.save)
             outcome = self.engine.step(envelope)
-            if self._recorder is not None:
-                self._recorder.after(outcome)
         except Exception:
             self._failed(f"the surface engine could not take a {type(envelope.body).__name__}")
             return None
+        self._record(lambda recorder: recorder.after(outcome))
         return outcome
+
+    def _record(self, tell: Callable[[Recorder], None]) -> None:
+        """Tell the recorder; that it fails must not keep anything from the engine or the displays."""
+        if self._recorder is None:
+            return
+        try:
+            tell(self._recorder)
+        except Exception:
+            self._failed("the journal could not be told")
 
     def _publish(self, outcomes: list[Outcome], sensors: tuple[SensorState, ...] | None) -> None:
         """Send the newest picture on, with every alert change since the one before: of pictures the newest wins."""
@@ -212,8 +219,7 @@ class SurfaceWorker:
         known = sensors if sensors is not None else (self.newest.sensors if self.newest is not None else ())
         picture = replace(newest, sensors=known, timings={**self._timings(), **newest.timings})
         self.newest = picture
-        if self._recorder is not None:
-            self._recorder.sensors(known)
+        self._record(lambda recorder: recorder.sensors(known))
         try:
             self._expect(picture)
         except Exception:

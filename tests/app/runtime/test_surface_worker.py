@@ -92,6 +92,30 @@ def test_an_input_that_the_engine_cannot_take_is_counted_and_the_thread_goes_on(
     made.stop()
 
 
+class Broken:
+    """A recorder that fails at everything."""
+
+    def before(self, envelope: Envelope, save: Any) -> None:
+        raise MemoryError("no room for a snapshot")
+
+    def after(self, outcome: Outcome) -> None:
+        raise ValueError("cannot be encoded")
+
+    def sensors(self, states: tuple[SensorState, ...]) -> None:
+        raise OSError("no disk")
+
+
+def test_a_recorder_that_fails_keeps_nothing_from_engine_and_displays() -> None:
+    made, engine = worker(recorder=Broken())
+    heard: list[Any] = []
+    made.listen(lambda picture, changes: heard.append((picture, changes)))
+    made.start()
+    assert made.ask(SetRunway("06/24")) == "set"
+    until(lambda: len(engine.of(Tick)) >= 2 and len(heard) >= 2, "pictures go on")
+    made.stop()
+    assert made.failures > 0
+
+
 def test_no_alert_change_is_lost_where_only_the_newest_picture_is_sent() -> None:
     made, engine = worker()
     heard: list[Any] = []
