@@ -238,8 +238,9 @@ def test_a_disk_that_fails_stops_the_journal_visibly(
 
     monkeypatch.setattr(output_module.os, "write", fail)
     put(writer, "event", 1)
-    until(lambda: writer.state().status == "stopped")
+    until(lambda: bool(heard))
     monkeypatch.undo()
+    assert writer.state().status == "stopped"
     assert os.strerror(code) in writer.state().detail
     assert len(heard) == 1
     put(writer, "event", 2)
