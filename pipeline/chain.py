@@ -18,7 +18,7 @@ from pipeline.contracts.extract import Extractor
 from pipeline.kernels.scan_convert import plot_images
 from pipeline.sites import RadarSite
 from pipeline.state import StateError
-from pipeline.tables import Detections, Plots, SectorPlots, Sweeps, TableError, VideoFormat
+from pipeline.tables import Detections, Plots, SectorPlots, Sweeps, TableError, VideoFormat, passed_marks
 
 PIECES = 8
 """A block is worked on in pieces of at most this part of a turn."""
@@ -83,9 +83,11 @@ class RadarChain:
         if not len(fresh):
             return self._sector(block.scan, Plots.empty(), degraded=False)
         self._count(fresh)
+        azimuths = self.site.video.azimuths
+        marks = passed_marks(fresh.scan * azimuths, fresh.row, fresh.time, self._next_row, azimuths)
         spent: dict[str, float] = {}
         made, degraded = [], False
-        for piece in _pieces(fresh, self.site.video.azimuths // PIECES):
+        for piece in _pieces(fresh, azimuths // PIECES):
             self._timed(spent, "keep", self._keep, piece)
             found: Detections = self._timed(spent, "detect", self.detector, self._numbered(piece), self._detecting)
             plots: Plots = self._timed(spent, "extract", self.extractor, piece, found, self._extracting)
@@ -98,7 +100,7 @@ class RadarChain:
         plots = made[0] if len(made) == 1 else Plots.concatenate(made)
         self._counts["plots"] += len(plots)
         self._counts["degraded_blocks"] += degraded
-        return self._sector(block.scan, plots, degraded)
+        return self._sector(block.scan, plots, degraded, *marks)
 
     def flush(self) -> SectorPlots:
         """Deliver the plots that are still open, as at the end of a recording."""
@@ -318,19 +320,12 @@ class RadarChain:
             self.newest[block.row] = block.amplitude
         self._next_row = newest + 1
 
-    def _sector(self, scan: int, plots: Plots, degraded: bool) -> SectorPlots:
+    def _sector(self, scan: int, plots: Plots, degraded: bool, *marks: NDArray[Any]) -> SectorPlots:
         closed_from = self._closed_to
         if self._next_row >= 0:
             self._closed_to = max(closed_from, int(self._extracting.closed_row))
-        return SectorPlots(
-            radar=self.index,
-            scan=scan,
-            time=self.time,
-            closed_from=max(closed_from, 0),
-            closed_to=max(self._closed_to, 0),
-            plots=plots,
-            degraded=degraded,
-        )
+        closed = max(closed_from, 0), max(self._closed_to, 0)
+        return SectorPlots(self.index, scan, self.time, *closed, plots, degraded, *marks)
 
     def _timed(self, spent: dict[str, float], stage: str, work: Callable[..., Any], *words: Any) -> Any:
         if self._clock is None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from pipeline.tables.schema import Array, Table, column
 
@@ -50,6 +52,10 @@ class SectorPlots:
     Rows are absolute: scan * azimuths + row. Every plot whose centroid lies before `closed_to` has now been delivered,
     so a track predicted between `closed_from` and `closed_to` that finds no plot has been missed by this radar.
     time: UTC of the newest sweep looked at. degraded: a cap was hit and detections were left out (counted).
+    mark: (k,) int64 absolute numbers, ascending, of the azimuth marks (`pipeline.tables.marks`) that the antenna passed
+    with the sweeps of this block. mark_time: (k,) float64 UTC s of the first sweep received at or after each mark.
+    Marks follow the sweeps received, so they may be ahead of `closed_to`; together they are the same however the sweeps
+    were cut into blocks. Both are empty when the source of the sectors does not know them.
     """
 
     radar: int
@@ -59,3 +65,5 @@ class SectorPlots:
     closed_to: int
     plots: Plots
     degraded: bool = False
+    mark: Array = field(default_factory=lambda: np.empty(0, np.int64))
+    mark_time: Array = field(default_factory=lambda: np.empty(0, np.float64))

@@ -16,7 +16,8 @@ A value is one octet that says its kind, and then:
     a u8 length, dtype, u8 dimensions, u64 each, items in C order (array) | n u8 length, dtype, item (numpy scalar)
     B u64 length, the byte form of a table (pipeline.tables.codec)
 
-A reference is the CRC-32 of the description, so that a class whose fields have changed is refused.
+A reference is the CRC-32 of the description, so that a class whose fields have changed is known. It is refused, but for
+one case: octets written before a class got further fields are read when each of these has a default, which it takes.
 """
 
 from __future__ import annotations
@@ -92,7 +93,8 @@ class ValueCodec:
     def decode(self, data: codec.Octets) -> Any:
         """The value of these octets, which may come from anywhere. Raises ValueError for all that are not well formed.
 
-        Fields of dataclasses are set as they were; no __init__ and no __post_init__ runs.
+        Fields of dataclasses are set as they were, and those that were not written to their defaults; no __init__ and
+        no __post_init__ runs.
         """
         reader = ValueReader(bytes(data), self._by_reference, self._fields)
         try:

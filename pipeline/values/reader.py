@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import struct
+import zlib
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from enum import Enum
+from functools import partial
 from math import prod
 from typing import Any
 
@@ -40,6 +43,23 @@ INT64 = (-(2**63), 2**63 - 1)
 """The least and the greatest number that is stored in 8 octets."""
 
 
+def defaults_of(kind: type) -> dict[str, Callable[[], Any]]:
+    """What makes the default of each field of a dataclass or named tuple that has one."""
+    if not dataclasses.is_dataclass(kind):
+        return {name: partial(_same, value) for name, value in getattr(kind, "_field_defaults", {}).items()}
+    made: dict[str, Callable[[], Any]] = {}
+    for field in dataclasses.fields(kind):
+        if field.default_factory is not dataclasses.MISSING:
+            made[field.name] = field.default_factory
+        elif field.default is not dataclasses.MISSING:
+            made[field.name] = partial(_same, field.default)
+    return made
+
+
+def _same(value: Any) -> Any:
+    return value
+
+
 class ValueReader:
     """Takes values from octets; `at` is where the next begins."""
 
@@ -48,16 +68,20 @@ class ValueReader:
         self.at = 0
         self._kinds = kinds
         self._fields = fields
+        self._older: dict[int, tuple[type, list[str]]] = {}
 
     def classes(self, described: dict[type, bytes]) -> None:
-        """Read the head; ValueError naming a class that is not registered, or that has other fields here."""
+        """Read the head; ValueError naming a class that is not registered, or that has other fields here.
+
+        A class that was written without fields that have a default here is taken.
+        """
         magic, version, count = HEAD.unpack_from(self.data)
         if magic != MAGIC:
             raise ValueError(f"no value: it begins with {magic!r} instead of {MAGIC!r}")
         if version != VERSION:
             raise ValueError(f"a value in version {version} of the byte form; this program reads version {VERSION}")
         self.at = HEAD.size
-        registered = {description.split()[0]: description for description in described.values()}
+        registered = {kind.__qualname__: kind for kind in described}
         for _ in range(count):
             reference, length = CLASS.unpack(self.take(CLASS.size))
             description = self.take(length)
@@ -65,10 +89,18 @@ class ValueReader:
             if kind is not None and described[kind] == description:
                 continue
             name, *fields = description.decode("utf-8", "replace").split() or ["?"]
-            here = registered.get(name.encode())
+            here = registered.get(name)
             if here is None:
                 raise ValueError(f"{name} is not registered")
-            raise ValueError(f"{name} was written with the fields {fields}; here they are {here.decode().split()[1:]}")
+            if kind is not None or reference != zlib.crc32(description) or not self._is_older(here, fields):
+                raise ValueError(f"{name} was written with the fields {fields}; here they are {[*self._fields[here]]}")
+            self._older[reference] = (here, fields)
+
+    def _is_older(self, kind: type, written: list[str]) -> bool:
+        """Nothing but fields with a default has been added to the class since."""
+        added = set(self._fields[kind]).difference(written)
+        kept = [name for name in self._fields[kind] if name not in added]
+        return bool(added) and written == kept and added <= defaults_of(kind).keys()
 
     def take(self, size: int) -> bytes:
         """The next octets; ValueError when there are fewer."""
@@ -125,17 +157,18 @@ class ValueReader:
             raise ValueError("octets of a value: a deque with another length than it may have")
         return deque(members, longest)
 
-    def kind(self, wanted: str) -> type:
-        """A registered class."""
+    def kind(self, wanted: str) -> tuple[type, Sequence[str]]:
+        """A registered class, and those of its fields that follow."""
         (reference,) = COUNT.unpack(self.take(4))
         kind = self._kinds.get(reference)
-        if kind is None or issubclass(kind, Enum) != (wanted == "enum"):
+        here, written = (kind, self._fields[kind]) if kind is not None else self._older.get(reference, (None, ()))
+        if here is None or issubclass(here, Enum) != (wanted == "enum"):
             raise ValueError(f"octets of a value: no registered {wanted} has the reference {reference:08x}")
-        return kind
+        return here, written
 
     def member(self) -> Any:
         """A member of an enum."""
-        kind = self.kind("enum")
+        kind, _ = self.kind("enum")
         value = self.value()
         try:
             return kind(value)
@@ -144,12 +177,16 @@ class ValueReader:
 
     def instance(self) -> Any:
         """A dataclass or named tuple."""
-        kind = self.kind("class")
-        values = [self.value() for _ in self._fields[kind]]
+        kind, written = self.kind("class")
+        values = {name: self.value() for name in written}
+        fields = self._fields[kind]
+        if len(written) < len(fields):
+            make = defaults_of(kind)
+            values = {name: values[name] if name in values else make[name]() for name in fields}
         if issubclass(kind, tuple):
-            return tuple.__new__(kind, values)
+            return tuple.__new__(kind, values.values())
         made = object.__new__(kind)
-        for name, value in zip(self._fields[kind], values, strict=True):
+        for name, value in values.items():
             object.__setattr__(made, name, value)
         return made
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -164,7 +165,7 @@ def shifted(envelope: Envelope, seconds: float) -> Envelope:
     body: Any = envelope.body
     if isinstance(body, SectorPlots):
         plots = body.plots.replace(time=body.plots.time + seconds)
-        body = SectorPlots(body.radar, body.scan, body.time + seconds, body.closed_from, body.closed_to, plots)
+        body = replace(body, time=body.time + seconds, plots=plots, mark_time=body.mark_time + seconds)
     elif not isinstance(body, Tick):
         body = body.replace(time=body.time + seconds)
     return Envelope(envelope.arrival + seconds, body)

@@ -14,7 +14,7 @@ from pipeline.classify.extent_speed import ExtentSpeed
 from pipeline.filter.kalman import Kalman
 from pipeline.lifecycle.score import Score
 from pipeline.sites import RadarSite
-from pipeline.tables import Plots, SectorPlots, VideoFormat
+from pipeline.tables import Plots, SectorPlots, VideoFormat, mark_row, marks_between
 from pipeline.tables.arrays import Array, Floats
 from pipeline.track.tracker import Tracker
 
@@ -97,20 +97,26 @@ class Field:
         )
 
     def sectors(self, turn: int, count: int) -> list[SectorPlots]:
-        """The next turn's plots in so many sectors of equal width."""
+        """The next turn's plots in so many sectors of equal width, with the azimuth marks of their rows."""
         plots, rows = self.scan(turn), self.site.video.azimuths
         sector = plots.azimuth / (2 * np.pi) * count
-        return [
-            SectorPlots(
-                0,
-                turn,
-                EPOCH + turn + (k + 1) / count,
-                turn * rows + rows * k // count,
-                turn * rows + rows * (k + 1) // count,
-                plots[(sector >= k) & (sector < k + 1)],
+        made = []
+        for k in range(count):
+            low, high = (turn * rows + rows * edge // count for edge in (k, k + 1))
+            mark = marks_between(low, high, rows)
+            made.append(
+                SectorPlots(
+                    0,
+                    turn,
+                    EPOCH + turn + (k + 1) / count,
+                    low,
+                    high,
+                    plots[(sector >= k) & (sector < k + 1)],
+                    mark=mark,
+                    mark_time=EPOCH + mark_row(mark, rows) / rows,
+                )
             )
-            for k in range(count)
-        ]
+        return made
 
 
 def make_bench_tracker(site: RadarSite, capacity: int = 2048) -> Tracker:

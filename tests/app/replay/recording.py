@@ -144,7 +144,8 @@ def shifted(envelopes: Iterable[Envelope], seconds: float) -> list[Envelope]:
 
     def later(body: Any) -> Any:
         if hasattr(body, "plots"):
-            return replace(body, time=body.time + seconds, plots=later(body.plots))
+            mark_time = body.mark_time + seconds
+            return replace(body, time=body.time + seconds, plots=later(body.plots), mark_time=mark_time)
         return body.replace(time=body.time + seconds) if hasattr(body, "columns") else body
 
     return [Envelope(one.arrival + seconds, later(one.body)) for one in envelopes]

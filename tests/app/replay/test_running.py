@@ -16,23 +16,24 @@ import pytest
 
 import app.journal.output as output_module
 from app.ingest.octets import encode_sweeps
-from app.journal.reader import open_journal
+from app.journal.reader import Record, open_journal
 from app.journal.recorder import SETTINGS_FILE
 from app.journal.video import VideoRecorder
 from app.replay.compare import compare
 from app.replay.recorded import recorded_run
-from app.replay.verify import verify
+from app.replay.verify import ReplayEngine, verify
 from app.replay.video import VideoReplay
 from app.runtime.host_clock import HostClock
 from app.service import SurfaceService
 from app.settings import JournalSettings, PartSettings, PartsSettings, RadarSettings, SettingsError
 from pipeline.bearing.moments import Moments
-from pipeline.engine_records import CHAIN, CODEC, INPUT, SWEEPS, ChainBlock
-from pipeline.inputs import PartsChanged
+from pipeline.engine_records import CHAIN, CODEC, INPUT, SNAPSHOT, SWEEPS, ChainBlock
+from pipeline.inputs import Envelope, PartsChanged
 from pipeline.picture import Picture, SensorState
 from pipeline.tables import Plots, SectorPlots, Sweeps
-from tests.app.replay.recording import airport, decoded, document, records, settings
+from tests.app.replay.recording import airport, decoded, document, records, rewritten, settings
 from tests.app.runtime.small_radar import AZIMUTHS, RANGES, T0, VIDEO, small_chain, small_site, turn
+from tests.support.older_forms import without_marks
 from tests.support.running import until
 
 SMALL = RadarSettings(
@@ -125,9 +126,41 @@ def test_a_part_of_it_is_identical_too(day: Path) -> None:
     assert found.sectors > 15
 
 
-def test_one_cell_of_the_video_is_told(day: Path, tmp_path: Path) -> None:
-    from tests.app.replay.recording import rewritten
+def test_a_journal_from_before_sectors_had_marks_is_compared_without_them(day: Path, tmp_path: Path) -> None:
+    (file,) = day.glob("*.mcap")
 
+    def older(one: Any) -> bytes:
+        made = decoded(one) if one.topic == INPUT else None
+        return without_marks(made) if made is not None and isinstance(made.body, SectorPlots) else one.data
+
+    assert any(len(made.body.mark) for one in records(day) if isinstance((made := decoded(one)), Envelope)
+               and isinstance(made.body, SectorPlots))  # fmt: skip
+    replay = ReplayEngine(open_journal(rewritten(file, tmp_path / "a.mcap", older)))
+    for one in replay.replayed():
+        if isinstance(one, Record) and one.topic == SNAPSHOT and replay.lost:
+            replay.restore(one)
+        assert replay.detection_difference is None
+    assert replay.counts.sectors > 60
+
+
+def test_one_mark_is_told(day: Path, tmp_path: Path) -> None:
+    (file,) = day.glob("*.mcap")
+    hit: list[float] = []
+
+    def change(one: Any) -> bytes:
+        made = decoded(one) if one.topic == INPUT else None
+        if hit or made is None or not isinstance(made.body, SectorPlots) or not len(made.body.mark):
+            return one.data
+        hit.append(one.time)
+        return CODEC.encode(replace(made, body=replace(made.body, mark=made.body.mark[:0])))
+
+    found = verify(open_journal(rewritten(file, tmp_path / "a.mcap", change)))
+    assert found.difference is not None
+    assert found.difference.startswith("plots at 2023-11-14T22:13:2")
+    assert "mark" in found.difference
+
+
+def test_one_cell_of_the_video_is_told(day: Path, tmp_path: Path) -> None:
     (file,) = day.glob("*.mcap")
     hit: list[float] = []
 

@@ -16,7 +16,7 @@ from pipeline.classify.extent_speed import ExtentSpeed
 from pipeline.filter.kalman import Kalman
 from pipeline.lifecycle.score import Score
 from pipeline.sites import NodeSite, RadarSite
-from pipeline.tables import Plots, SectorPlots, VideoFormat
+from pipeline.tables import Plots, SectorPlots, VideoFormat, mark_row, marks_between
 from pipeline.track.tracker import Tracker
 
 T0 = 1_700_000_000.0
@@ -128,13 +128,20 @@ def scan_plots(
 
 
 def split_scan(plots: Plots, scan: int, sectors: int, site: RadarSite = RADAR, radar: int = 0) -> list[SectorPlots]:
-    """The same turn as equal sectors; a plot comes with the sector in which its centroid is closed."""
+    """The same turn as equal sectors; a plot comes with the sector in which its centroid is closed, an azimuth mark
+    with the one that has its row."""
     made = []
     own = plots.azimuth % (2 * np.pi) / (2 * np.pi) * A
     for k in range(sectors):
         low, high = A * k // sectors, A * (k + 1) // sectors
         inside = (own >= low) & (own < high)
-        made.append(SectorPlots(radar, scan, T0 + scan + high / A, scan * A + low, scan * A + high, plots[inside]))
+        mark = marks_between(scan * A + low, scan * A + high, A)
+        made.append(
+            SectorPlots(
+                radar, scan, T0 + scan + high / A, scan * A + low, scan * A + high, plots[inside],
+                mark=mark, mark_time=T0 + mark_row(mark, A) / A,
+            )
+        )  # fmt: skip
     return made
 
 

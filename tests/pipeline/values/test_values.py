@@ -8,6 +8,7 @@ import math
 import struct
 import subprocess
 import sys
+import zlib
 from collections import Counter, deque
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -21,6 +22,7 @@ from pipeline.picture import Alert, AlertChange, AlertTarget
 from pipeline.tables import Source, Table, Tracks
 from pipeline.values import ValueCodec, is_value
 from pipeline.values.differences import first_difference
+from pipeline.values.reader import CLASS, FLOAT, HEAD, MAGIC, TAGGED, VERSION
 from tests.pipeline.tables.made import table_of, tables
 
 
@@ -164,6 +166,47 @@ def test_a_class_whose_fields_have_changed_is_named_with_both() -> None:
         ValueCodec([Point, Other])
     with pytest.raises(ValueError, match="int is neither"):
         ValueCodec([int])
+
+
+def test_fields_that_were_not_written_take_their_defaults() -> None:
+    @dataclass(slots=True)
+    class Later:
+        name: str
+        kind: str = "car"
+        seen: dict[int, Point] = field(default_factory=dict)
+        made: int = field(init=False, default=0)
+        places: list[int] = field(default_factory=lambda: [4])
+
+    class LaterPair(NamedTuple):
+        first: Any
+        second: Any
+        third: Any = "none"
+
+    Later.__qualname__, LaterPair.__qualname__ = "Open", "Pair"
+    later = ValueCodec([Later, LaterPair, Point])
+    value = [Open("a", {1: Point(2.0)}), Pair(3, Open("b")), Pair(5, 6)]
+    one, pair, plain = later.decode(codec.encode(value))
+    assert (one.name, one.kind, one.seen, one.made, one.places) == ("a", "car", {1: Point(2.0)}, 99, [4])
+    assert (type(pair), pair.first, pair.second.name, pair.third) == (LaterPair, 3, "b", "none")
+    assert plain == (5, 6, "none")
+    assert one.places is not pair.second.places
+    assert later.encode([one, pair, plain]) == later.encode(later.decode(later.encode([one, pair, plain])))
+
+
+@pytest.mark.parametrize("fields", ["y", "y x", "x y z", "x x", "x  ", "x y ", ""])
+def test_no_other_change_of_fields_is_read(fields: str) -> None:
+    """Point has x, without a default, and y, with one."""
+    written = f"Point {fields}".encode()
+    reference = zlib.crc32(written)
+    data = HEAD.pack(MAGIC, VERSION, 1) + CLASS.pack(reference, len(written)) + written
+    data += TAGGED.pack(b"D", reference) + FLOAT.pack(b"f", 1.0) * len(fields.split())
+    if fields.split() == ["x"]:
+        assert codec.decode(data) == Point(1.0, 0.0)
+        with pytest.raises(ValueError, match="Point was written with"):
+            codec.decode(data.replace(struct.pack("<I", reference), b"abcd"))
+        return
+    with pytest.raises(ValueError, match="Point was written with"):
+        codec.decode(data)
 
 
 def test_a_value_that_holds_itself_or_nests_too_deep_is_refused() -> None:

@@ -1,0 +1,54 @@
+"""Azimuth marks: fixed directions of the antenna at which later stages decide, however a turn is cut into blocks."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+import numpy as np
+
+from pipeline.tables.arrays import Array
+
+Numbers = TypeVar("Numbers", int, Array)
+"""One whole number or an int64 array of them."""
+
+MARKS_A_TURN = 32
+"""Marks in one turn of the antenna. What waits for the next mark waits for a 32nd of a turn at most: 31 ms at one turn
+a second, little beside the time the extractor needs to complete a plot. More marks cost more decisions a turn."""
+
+
+def mark_row(mark: Numbers, azimuths: int) -> Numbers:
+    """The absolute row (scan * azimuths + row) at which a mark stands.
+
+    mark: absolute mark number (scan * MARKS_A_TURN + mark of the turn), or an int64 array of them. azimuths: rows a
+    turn; with fewer than MARKS_A_TURN several marks stand at the same row.
+    """
+    return mark * azimuths // MARKS_A_TURN
+
+
+def first_mark(row: int, azimuths: int) -> int:
+    """The first mark that stands at or after an absolute row."""
+    return -(-row * MARKS_A_TURN // azimuths)
+
+
+def marks_between(low: int, high: int, azimuths: int) -> Array:
+    """(k,) int64 the marks whose absolute row is `low` or later and before `high`, ascending."""
+    return np.arange(first_mark(low, azimuths), first_mark(high, azimuths), dtype=np.int64)
+
+
+def passed_marks(first: int, row: Array, time: Array, expected: int, azimuths: int) -> tuple[Array, Array]:
+    """The marks that the antenna passed with a block of sweeps, and the times of passing.
+
+    first: absolute row of row 0 of the block's turn. row: (n,) ascending rows of the sweeps in the turn, at least one.
+    time: (n,) float64 UTC s of each. expected: the absolute row after the newest one received before, at most
+    first + row[0]. azimuths: rows a turn.
+
+    Returns (k,) int64 absolute mark numbers, ascending, and (k,) float64 UTC s. The time of a mark is that of the first
+    sweep received at its row or after it: no value depends on how the sweeps were cut into blocks. Marks in a gap
+    longer than a turn are left out: the first sweep after it says nothing of when the antenna passed them.
+    """
+    start = first + int(row[0])
+    low = expected if start - expected <= azimuths else start
+    mark = marks_between(low, first + int(row[-1]) + 1, azimuths)
+    if not len(mark):
+        return mark, np.empty(0, np.float64)
+    return mark, time[np.searchsorted(row, mark_row(mark, azimuths) - first)]
