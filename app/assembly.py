@@ -18,6 +18,7 @@ from pipeline.chain import RadarChain
 from pipeline.engine import SurfaceEngine
 from pipeline.sites import NodeSite, RadarSite
 from pipeline.tables import VideoFormat
+from pipeline.track.settings import ReportingSettings, TrackerSettings
 from pipeline.track.tracker import Tracker
 
 
@@ -119,6 +120,8 @@ def surface_engine(
         associate=_part("associate", settings.parts.associate),
         lifecycle=_part("lifecycle", settings.parts.lifecycle),
         classify=_part("classify", settings.parts.classify),
+        capacity=settings.tracker.capacity,
+        settings=TrackerSettings(reporting=ReportingSettings(asterix_numbers=settings.tracker.asterix_numbers)),
     )
     rules = tuple(_part("alert", one) for one in settings.parts.alert)
     monitor = AlertMonitor(airport, rules, first_id=first_alert, nodes=nodes)

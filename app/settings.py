@@ -11,6 +11,8 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
+from pipeline.track.settings import LARGEST_CAPACITY
+
 ROOT = Path(__file__).resolve().parent.parent
 """The checkout or the image: where `static`, `migrations` and `app` lie."""
 
@@ -158,6 +160,23 @@ class FeedSettings(Section):
     compress: bool = Field(False, description="permessage-deflate, for clients far away")
 
 
+class TrackerSettings(Section):
+    """The table of tracks."""
+
+    capacity: int = Field(
+        2048,
+        ge=1,
+        le=LARGEST_CAPACITY,
+        description="tracks at most, those not confirmed yet included; each takes 0.4 kB of memory, and 8 bytes for "
+        "each radar, from the start on; targets without room are counted as no_room",
+    )
+    asterix_numbers: bool = Field(
+        False,
+        description="give each track a number 1..4095, which ASTERIX has room for, beside its id (64 bits, never "
+        "given twice in a run); displays and alerts show it in place of the id",
+    )
+
+
 class LimitsSettings(Section):
     """Bounds on what comes in and on what is queued."""
 
@@ -244,6 +263,7 @@ class Settings(BaseSettings):
     nodes: tuple[NodeSettings, ...] = ()
     runways: tuple[RunwaySettings, ...] = ()
     parts: PartsSettings = PartsSettings()
+    tracker: TrackerSettings = TrackerSettings()
     feed: FeedSettings = FeedSettings()
     limits: LimitsSettings = LimitsSettings()
     storage: StorageSettings = StorageSettings()

@@ -98,6 +98,7 @@ class Wire:
         course[~(speed >= MOVING_MPS)] = np.nan
         return {
             "id": tracks.id.tolist(),
+            "number": [one or None for one in tracks.number.tolist()],
             "time": np.round(tracks.time, 3).tolist(),
             "lat": nullable(latitude, 7),
             "lon": nullable(longitude, 7),
@@ -181,6 +182,7 @@ class Wire:
         course = target.course
         return {
             "track": target.track,
+            "number": target.number,
             "callsign": target.callsign,
             "address": target.address,
             "class": target.category,

@@ -24,7 +24,7 @@ from pipeline.tables import SectorPlots, Sweeps, Tracks
 from pipeline.tables.arrays import Array, Floats
 from pipeline.track.false_plots import FalsePlots
 from pipeline.track.look import RadarClock
-from pipeline.track.table import TrackNumbers
+from pipeline.track.numbers import TrackNumbers
 from pipeline.values import ValueCodec
 
 

@@ -15,7 +15,11 @@ AlertOperation = Literal["raise", "update", "acknowledge", "clear"]
 
 @dataclass(frozen=True)
 class AlertTarget:
-    """A target as it was when its alert was last updated. course: rad; nan speeds and courses do not occur (None)."""
+    """A target as it was when its alert was last updated.
+
+    track: its id. number: its ASTERIX track number, None when it has none. course: rad; nan speeds and courses do not
+    occur (None).
+    """
 
     track: int
     callsign: str | None
@@ -25,6 +29,7 @@ class AlertTarget:
     north: float
     speed: float
     course: float | None
+    number: int | None = None
 
 
 @dataclass(frozen=True)

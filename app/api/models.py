@@ -10,8 +10,22 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+LARGEST_ID = 2**53 - 1
+"""The greatest whole number that every reader of JSON takes exactly; ids hold 64 bits and never get there."""
+
 Seconds = Annotated[float, Field(description="Unix seconds, UTC", examples=[1760000000.25])]
 Mode = Annotated[Literal["live", "demo", "replay"], Field(description="anything but live is no live traffic")]
+TrackId = Annotated[
+    int,
+    Field(ge=1, le=LARGEST_ID, description="1, 2, 3, ... in the order of confirmation; never given again in a run"),
+]
+TrackNumber = Annotated[
+    int,
+    Field(
+        ge=1, le=4095, description="ASTERIX track number, shown in place of the id; given again some time after the "
+        "track has ended. null: none are given (tracker.asterix_numbers), or none was free"
+    ),
+]  # fmt: skip
 ClassName = Literal["aircraft", "vehicle", "unknown"]
 PhaseName = Literal["tentative", "confirmed", "coasting"]
 SourceName = Literal["radar", "node", "report"]
@@ -47,7 +61,8 @@ class Position(Model):
 class Track(Model):
     """One target as it is believed to be at `time`."""
 
-    id: int = Field(ge=1, le=4095, description="track number; used again after its bearer is forgotten")
+    id: TrackId
+    number: TrackNumber | None
     time: Seconds
     lat: float | None
     lon: float | None
@@ -74,7 +89,8 @@ class Track(Model):
 class AlertTarget(Position):
     """A target as it was when its alert was last updated."""
 
-    track: int
+    track: TrackId
+    number: TrackNumber | None
     callsign: str | None
     address: str | None
     class_: str = Field(alias="class")
@@ -154,8 +170,8 @@ class RunwayUse(Model):
     open: bool
     in_use: str | None = Field(description="designator of the direction in use; null when not in use")
     visibility: Literal["normal", "low"]
-    occupants: list[int] = Field(description="tracks inside the protection area")
-    next_arrival: int | None
+    occupants: list[TrackId] = Field(description="tracks inside the protection area")
+    next_arrival: TrackId | None
     next_arrival_s: float | None
 
 
@@ -212,10 +228,11 @@ class HistoryPoint(Model):
 
 
 class StoredTrack(Model):
-    """A track in storage. uid: its own for ever, unlike the track number."""
+    """A track in storage. uid: its own for ever, unlike the id, which begins anew with each run of the service."""
 
     uid: int
-    id: int
+    id: TrackId
+    number: TrackNumber | None
     born: Seconds
     first: Seconds
     last: Seconds

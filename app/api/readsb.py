@@ -22,6 +22,10 @@ NAC_P = ((3.0, 11), (10.0, 10), (30.0, 9), (92.6, 8), (185.2, 7), (555.6, 6))
 """Position accuracy categories of DO-260B: 95 % radius in metres below which each holds."""
 
 
+NO_ADDRESS = 1 << 24
+"""A hex has 24 bits. Two live tracks would share one only if 16 million others had begun between them."""
+
+
 def readsb_router(context: Context) -> APIRouter:
     """GET /data/aircraft.json and /data/receiver.json."""
     router = APIRouter(prefix="/data", tags=["readsb"])
@@ -29,7 +33,7 @@ def readsb_router(context: Context) -> APIRouter:
 
     @router.get("/aircraft.json")
     async def aircraft() -> Response:
-        """The live tracks as readsb would give them; a hex with ~ is our own number."""
+        """The live tracks as readsb would give them; a hex with ~ is the track's id."""
         picture = context.hub.picture
         if picture is None:
             return answer({"now": 0.0, "messages": 0, "aircraft": []})
@@ -77,7 +81,7 @@ def aircraft_document(picture: Picture, rows: list[Row], elevation: float | None
 
 def _aircraft(row: Row, seen: float, hits: int, elevation: float | None) -> Row:
     made: Row = {
-        "hex": row["address"] or f"~{row['id']:06x}",
+        "hex": row["address"] or f"~{row['id'] % NO_ADDRESS:06x}",
         "type": _type(row),
         "flight": f"{row['callsign']:<8}" if row["callsign"] else None,
         "alt_baro": _altitude(row, elevation),

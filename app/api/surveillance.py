@@ -12,7 +12,7 @@ from app.api.context import Context, From, To, answer, problems
 from app.api.problems import ApiProblem
 from app.wire import Row, encode
 
-TrackId = Annotated[int, Path(ge=1, le=4095, description="track number")]
+TrackId = Annotated[int, Path(ge=1, le=models.LARGEST_ID, description="id of the track, as in the list of tracks")]
 AlertId = Annotated[int, Path(ge=1, le=2**53)]
 Limit = Annotated[int, Query(ge=1, le=10_000)]
 GEOJSON = "application/geo+json"
@@ -94,7 +94,7 @@ def _track_routes(router: APIRouter, context: Context) -> None:
         for row in hub.rows():
             if row["id"] == id:
                 return answer({**stamp, "track": row})
-        raise ApiProblem(404, f"no live track has the number {id}")
+        raise ApiProblem(404, f"no live track has the id {id}")
 
 
 def _history_routes(router: APIRouter, context: Context) -> None:
@@ -104,12 +104,12 @@ def _history_routes(router: APIRouter, context: Context) -> None:
         "/tracks/{id}/history", response_model=models.History, responses=problems(404, 422, 503), tags=["tracks"]
     )
     def history(id: TrackId, from_: From = None, to: To = None, limit: Limit = 3600) -> Response:
-        """The stored points of the newest track with this number (or the newest within the given times)."""
+        """The stored points of the newest track with this id (or the newest within the given times)."""
         if store is None:
             raise ApiProblem(404, "nothing is stored")
         found = store.track_history(id, from_, to, limit)
         if found is None:
-            raise ApiProblem(404, f"no track with the number {id} is stored")
+            raise ApiProblem(404, f"no track with the id {id} is stored")
         return answer({"mode": mode, **found})
 
     @router.get("/history/tracks", response_model=models.StoredTrackList, responses=problems(422, 503), tags=["tracks"])

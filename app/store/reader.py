@@ -41,7 +41,7 @@ class Reader:
         return {"track": _track(found), "points": self._points(rows), "truncated": truncated}
 
     def bearer(self, id: int, first: float | None, last: float | None) -> Select[Any]:
-        """The query for the newest bearer of a track number."""
+        """The query for the newest track with an id."""
         table = schema.tracks
         wanted = select(table).where(table.c.airport == self.airport, table.c.track_id == id)
         if first is not None:
@@ -137,6 +137,7 @@ def _track(row: Any) -> Row:
     return {
         "uid": row["uid"],
         "id": row["track_id"],
+        "number": row["number"],
         "born": row["born"],
         "first": row["first_time"],
         "last": row["last_time"],

@@ -1,7 +1,8 @@
 """The tables, as SQLAlchemy Core; `migrations/` brings a database to them step by step.
 
-Columns are in the units of the wire and carry them in their names; times are Unix seconds (UTC). A track number comes
-round again, so a stored track has a `uid` of its own. Points are clustered by (uid, time): the history of a track is
+Columns are in the units of the wire and carry them in their names; times are Unix seconds (UTC). The ids of tracks
+begin anew with each run of the service, so a stored track has a `uid` of its own. Its `number` is the last ASTERIX
+track number that it had. Points are clustered by (uid, time): the history of a track is
 one contiguous read.
 """
 
@@ -24,7 +25,10 @@ from sqlalchemy import (
 
 metadata = MetaData()
 
-_Key = BigInteger().with_variant(Integer, "sqlite")
+_Integer64 = BigInteger().with_variant(Integer, "sqlite")
+"""64 bits. SQLite's INTEGER has them too, so that a column of an earlier version need not be made anew."""
+
+_Key = _Integer64
 """SQLite numbers rows by itself only where the type is spelt INTEGER."""
 
 tracks = Table(
@@ -33,7 +37,7 @@ tracks = Table(
     Column("uid", _Key, primary_key=True, autoincrement=True),
     Column("airport", String(16), nullable=False),
     Column("mode", String(8), nullable=False),
-    Column("track_id", Integer, nullable=False),
+    Column("track_id", _Integer64, nullable=False),
     Column("born", Double, nullable=False),
     Column("first_time", Double, nullable=False),
     Column("last_time", Double, nullable=False),
@@ -41,6 +45,7 @@ tracks = Table(
     Column("callsign", String(8)),
     Column("address", String(6)),
     Column("simulated", Boolean, nullable=False),
+    Column("number", Integer),
     Index("ix_tracks_number", "airport", "track_id", "last_time"),
     Index("ix_tracks_last", "airport", "last_time"),
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,7 @@ from app.store.batch import Queue
 from app.store.database import migrate, open_engine
 from app.store.reader import Reader
 from app.store.retention import Retention
-from app.store.writer import Writer, close_open_alerts
+from app.store.writer import FORGET_S, Writer, close_open_alerts
 from app.wire import Row, Wire, plain
 from pipeline.airport.model import Airport
 from pipeline.picture import AlertChange, Picture, SensorState
@@ -89,7 +88,7 @@ class Store:
         )
 
     def track_history(self, id: int, first: float | None, last: float | None, limit: int) -> Row | None:
-        """The newest track with a number (within the times) with its points; None when there is none."""
+        """The newest track with an id (within the times) with its points; None when there is none."""
         return self._reader.track_history(id, first, last, limit)
 
     def tracks(
@@ -144,12 +143,16 @@ class Store:
 
 
 class _Due:
-    """Which tracks of a picture are due for a stored point: each at most once in `interval` seconds."""
+    """Which tracks of a picture are due for a stored point: each at most once in `interval` seconds.
+
+    Remembers of each track, by id in ascending order, the time of its last point and its birth.
+    """
 
     def __init__(self, interval: float) -> None:
         self.interval = interval
-        self._last: NDArray[Any] = np.full(4096, -np.inf)
-        self._born: NDArray[Any] = np.full(4096, np.nan)
+        self._ids: NDArray[np.int64] = np.zeros(0, np.int64)
+        self._last: NDArray[np.float64] = np.zeros(0)
+        self._born: NDArray[np.float64] = np.zeros(0)
         self._time = -np.inf
 
     def choose(self, tracks: Tracks, time: float) -> NDArray[np.bool_]:
@@ -157,15 +160,21 @@ class _Due:
         if time < self._time - 1.0:
             self._last[:] = -np.inf  # a replay was wound back
         self._time = time
-        if not len(tracks):
-            return np.zeros(0, dtype=np.bool_)
-        id = tracks.id.astype(np.int64)
-        if int(id.max()) >= len(self._last):
-            more = int(id.max()) + 1 - len(self._last)
-            self._last = np.append(self._last, np.full(more, -np.inf))
-            self._born = np.append(self._born, np.full(more, np.nan))
-        waited = tracks.time - self._last[id]
-        due = (self._born[id] != tracks.born) | ((waited > 0) & (waited >= 0.999 * self.interval))
-        self._last[id[due]] = tracks.time[due]
-        self._born[id[due]] = tracks.born[due]
+        if not np.isin(tracks.id, self._ids).all():
+            self._make_room(np.unique(tracks.id), time)
+        at = np.searchsorted(self._ids, tracks.id)
+        waited = tracks.time - self._last[at]
+        due = (self._born[at] != tracks.born) | ((waited > 0) & (waited >= 0.999 * self.interval))
+        self._last[at[due]] = tracks.time[due]
+        self._born[at[due]] = tracks.born[due]
         return np.asarray(due)
+
+    def _make_room(self, ids: NDArray[np.int64], time: float) -> None:
+        """Remember these ids (k,), ascending, too, and forget those not among them that were not due for long."""
+        kept = (self._last >= time - FORGET_S) | np.isin(self._ids, ids)
+        fresh = np.setdiff1d(ids, self._ids, assume_unique=True)
+        all_ids = np.r_[self._ids[kept], fresh]
+        order = np.argsort(all_ids, kind="stable")
+        self._ids = all_ids[order]
+        self._last = np.r_[self._last[kept], np.full(len(fresh), -np.inf)][order]
+        self._born = np.r_[self._born[kept], np.full(len(fresh), np.nan)][order]

@@ -161,7 +161,7 @@ class Writer:
             rows[i]["uid"] = uid
             newest[uid] = self._track_row(tracks, i)
         connection.execute(insert(schema.track_points), rows)
-        names = ("last_time", "category", "callsign", "address", "simulated")
+        names = ("last_time", "category", "callsign", "address", "simulated", "number")
         changed = update(schema.tracks).where(schema.tracks.c.uid == bindparam("which"))
         values = [{"which": uid, **{name: row[name] for name in names}} for uid, row in newest.items()]
         connection.execute(changed.values({name: bindparam(name) for name in names}), values)
@@ -181,6 +181,7 @@ class Writer:
             "callsign": str(tracks.callsign[i]) or None,
             "address": str(tracks.address[i]) or None,
             "simulated": bool(tracks.simulated[i]),
+            "number": int(tracks.number[i]) or None,
         }
 
     def _forget(self, now: float) -> None:

@@ -40,7 +40,7 @@ class Eye:
 
 def label_text(target: Target) -> str:
     """One line: gravity, name, speed; what rests on simulated input says so."""
-    name = target.name or f"#{target.id}"
+    name = target.name or f"#{target.number}"
     speed = f" {target.speed * KNOTS:.0f} kt" if target.speed >= MOVING_MPS else ""
     gravity = {"alarm": "ALARM ", "information": "INFO "}.get(target.stage or "", "")
     return f"{gravity}{name}{speed}{' coasting' if target.coasting else ''}{' (sim)' if target.simulated else ''}"

@@ -68,9 +68,11 @@ class Strokes:
 
 @dataclass(frozen=True)
 class Target:
-    """One track as the labels and panels need it. stage: of its gravest live alert, or None. heading: rad or nan."""
+    """One track as the labels and panels need it. number: what it is called where it has no name. stage: of its gravest
+    live alert, or None. heading: rad or nan."""
 
     id: int
+    number: int
     row: int
     east: float
     north: float
@@ -261,13 +263,14 @@ def _targets(
     stages: dict[int, str],
 ) -> dict[int, Target]:
     columns = zip(
-        tracks.id.tolist(), position.tolist(), speed.tolist(), size[:, 0].tolist(), tracks.callsign.tolist(),
-        category.tolist(), (tracks.runway >= 0).tolist(), (tracks.phase == TrackPhase.COASTING).tolist(),
-        tracks.simulated.tolist(), strict=True,
+        tracks.id.tolist(), tracks.shown_number.tolist(), position.tolist(), speed.tolist(), size[:, 0].tolist(),
+        tracks.callsign.tolist(), category.tolist(), (tracks.runway >= 0).tolist(),
+        (tracks.phase == TrackPhase.COASTING).tolist(), tracks.simulated.tolist(), strict=True,
     )  # fmt: skip
     return {
         id: Target(
             id,
+            number,
             row,
             where[0],
             where[1],
@@ -281,7 +284,7 @@ def _targets(
             simulated,
             stages.get(id),
         )
-        for row, (id, where, fast, long, name, kind, on_runway, coasting, simulated) in enumerate(columns)
+        for row, (id, number, where, fast, long, name, kind, on_runway, coasting, simulated) in enumerate(columns)
     }
 
 

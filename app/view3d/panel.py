@@ -112,8 +112,8 @@ def selected(airport: Airport, frame: Frame, target: Target | None) -> str:
         "Sources": ", ".join(sources) or "none",
         "Alert": target.stage or "none",
     }
-    name = _plain(target.name) or f"Track {target.id}"
-    head = f"### {name}\nTrack {target.id}{', **simulated input**' if target.simulated else ''}\n"
+    name = _plain(target.name) or f"Track {target.number}"
+    head = f"### {name}\nTrack {target.number}{', **simulated input**' if target.simulated else ''}\n"
     return head + "\n| | |\n| --- | --- |\n" + "\n".join(f"| {k} | {_plain(v)} |" for k, v in facts.items())
 
 

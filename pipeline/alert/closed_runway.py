@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.alert.conflict import RuleSettings, approach_fields, stage_of, track_numbers
+from pipeline.alert.conflict import RuleSettings, approach_fields, stage_of, track_ids
 from pipeline.contracts.alert import Conflict, Situation
 from pipeline.picture import Stage
 
@@ -58,7 +58,7 @@ def _conflict(s: Situation, r: int, row: int, stage: Stage, text: str, parameter
     return Conflict(
         rule="closed_runway",
         runway=s.frames.ids[r],
-        tracks=track_numbers(s, row),
+        tracks=track_ids(s, row),
         stage=stage,
         text=text,
         certain=bool(s.certain[row]),

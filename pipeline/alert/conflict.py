@@ -86,6 +86,6 @@ def approach_fields(situation: Situation, runway: int, row: int) -> dict[str, An
     }
 
 
-def track_numbers(situation: Situation, *rows: int) -> tuple[int, ...]:
-    """The track numbers of rows."""
+def track_ids(situation: Situation, *rows: int) -> tuple[int, ...]:
+    """The ids of the tracks in these rows."""
     return tuple(int(situation.tracks.id[row]) for row in rows)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.alert.conflict import RuleSettings, approach_fields, closest_approach, stage_of, track_numbers
+from pipeline.alert.conflict import RuleSettings, approach_fields, closest_approach, stage_of, track_ids
 from pipeline.contracts.alert import Conflict, Entry, Situation
 from pipeline.tables import TargetClass
 
@@ -66,7 +66,7 @@ class HoldEntry(RuleSettings):
                     s,
                     r,
                     entry,
-                    tracks=track_numbers(s, row, int(other)),
+                    tracks=track_ids(s, row, int(other)),
                     stage=stage,
                     text=f"{s.label(row)} passed {s.holds.names[entry.hold]}, {s.label(int(other))} {doing} "
                     f"{s.designator(r, int(other))} in {time:.0f} s",
@@ -85,7 +85,7 @@ class HoldEntry(RuleSettings):
                     s,
                     r,
                     entry,
-                    tracks=track_numbers(s, row),
+                    tracks=track_ids(s, row),
                     stage="information",
                     text=text,
                     certain=bool(entry.node),

@@ -71,7 +71,7 @@ class Case:
         return "alarm" if alarm else "information"
 
     def matches(self, conflict: Conflict, addresses: tuple[str, ...]) -> bool:
-        """The same alert although a track number has changed: each target is the same track or has the same address."""
+        """The same alert although a target has a new track: each target is the same track or has the same address."""
         mine = self.conflict
         if (mine.rule, mine.runway, len(mine.tracks)) != (conflict.rule, conflict.runway, len(conflict.tracks)):
             return False
@@ -133,4 +133,5 @@ def describe(situation: Situation, row: int) -> AlertTarget:
         north=float(situation.position[row, 1]),
         speed=speed,
         course=course if speed > 0.5 else None,
+        number=int(tracks.number[row]) or None,
     )

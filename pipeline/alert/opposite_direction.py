@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from pipeline.alert.conflict import RuleSettings, approach_fields, closest_approach, stage_of, track_numbers
+from pipeline.alert.conflict import RuleSettings, approach_fields, closest_approach, stage_of, track_ids
 from pipeline.contracts.alert import Conflict, Situation
 
 CAT004_OPPOSITE = 11
@@ -65,7 +65,7 @@ class OppositeDirection(RuleSettings):
         return Conflict(
             rule="opposite_direction",
             runway=s.frames.ids[r],
-            tracks=track_numbers(s, first, second),
+            tracks=track_ids(s, first, second),
             stage=stage,
             text=f"{names}, meeting in {gap / closing:.0f} s",
             certain=bool(s.certain[one] and s.certain[other]),

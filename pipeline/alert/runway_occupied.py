@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.alert.conflict import RuleSettings, approach_fields, closest_approach, stage_of, track_numbers
+from pipeline.alert.conflict import RuleSettings, approach_fields, closest_approach, stage_of, track_ids
 from pipeline.contracts.alert import Conflict, Situation
 
 CAT004_ARRIVAL, CAT004_DEPARTURE = 9, 12
@@ -125,7 +125,7 @@ class RunwayOccupied(RuleSettings):
         return Conflict(
             rule="runway_occupied",
             runway=s.frames.ids[r],
-            tracks=track_numbers(s, row, other),
+            tracks=track_ids(s, row, other),
             holding_point=None if entry is None else s.holds.names[entry.hold],
             parameter_set=parameters,
             cat004_type=type,

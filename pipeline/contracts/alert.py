@@ -131,7 +131,8 @@ class Situation:
     def label(self, row: int) -> str:
         """What a controller would call the target."""
         callsign = str(self.tracks.callsign[row]).strip()
-        return callsign or f"{TargetClass(int(self.tracks.category[row])).name.title()} {int(self.tracks.id[row])}"
+        number = int(self.tracks.shown_number[row])
+        return callsign or f"{TargetClass(int(self.tracks.category[row])).name.title()} {number}"
 
     @cached_property
     def aircraft(self) -> Array:
@@ -143,7 +144,7 @@ class Situation:
 class Conflict:
     """One dangerous constellation, as seen in one situation. Times s, lengths m, (east, north) m.
 
-    tracks: track numbers, the moving one first. certain: no need to see it again before the alert is raised.
+    tracks: ids of tracks, the moving one first. certain: no need to see it again before the alert is raised.
     cat004_type: message type of ASTERIX CAT004. cat011_type: alert type of CAT011 I600 (free; see each rule).
     """
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 
+import numpy as np
+
 from pipeline.tables.schema import Array, Table, column
 
 
@@ -37,7 +39,7 @@ class Source(IntFlag):
 class Tracks(Table):
     """One row a track, each at its own time."""
 
-    id: Array = column("i4", "", "track number, 1 .. 4095, not used again while its last bearer is remembered")
+    id: Array = column("i8", "", "1, 2, 3, ... in the order of confirmation, never given again in a run")
     time: Array = column("f8", "s", "UTC to which the state belongs")
     state: Array = column("f8", "m, m/s", "east, north, velocity east, velocity north", shape=(4,))
     covariance: Array = column("f8", "m, m/s", "covariance of state", shape=(4, 4))
@@ -58,3 +60,13 @@ class Tracks(Table):
     simulated: Array = column("?", "", "rests on simulated input", default=False)
     zone: Array = column("i4", "", "index of the airport feature it is on, -1 for none", default=-1)
     runway: Array = column("i2", "", "index of the runway whose strip it is in, -1 for none", default=-1)
+    number: Array = column("u2", "", "ASTERIX track number, 1 .. 4095, given again after a rest; 0 for none", default=0)
+
+    @property
+    def shown_number(self) -> Array:
+        """(n,) int64, what displays and texts call each track: its number; its id where it has none.
+
+        Both are never mixed up: a track is without number only where none are given, or while 4095 others bear them
+        all, so that its id is above 4095.
+        """
+        return np.where(self.number > 0, self.number, self.id)

@@ -18,9 +18,10 @@ from pipeline.tables import Plots, Source, TrackPhase
 from pipeline.tables.arrays import Array, Floats
 from pipeline.track.false_plots import FalsePlots
 from pipeline.track.look import RadarClock
-from pipeline.track.settings import TrackerSettings
+from pipeline.track.numbers import LAST_ASTERIX_NUMBER, TrackNumbers
+from pipeline.track.settings import LARGEST_CAPACITY, TrackerSettings
 from pipeline.track.shape import extents
-from pipeline.track.table import NEVER, TrackNumbers, TrackTable
+from pipeline.track.table import NEVER, TrackTable
 
 SOURCE_TIMES = {Source.RADAR: "radar_time", Source.NODE: "node_time", Source.REPORT: "report_time"}
 """The column of the track table that holds when each kind of sensor last contributed."""
@@ -196,11 +197,23 @@ def update_lifecycle(core: Core) -> None:
     ended |= bad
     _learn_false_plots(core, ended & (phase == TrackPhase.TENTATIVE))
     table.phase[:n] = phase
-    for row in np.flatnonzero((phase != TrackPhase.TENTATIVE) & (table.id[:n] == 0) & ~ended):
-        table.id[row] = core.numbers.take(core.time)
-        core.count("confirmed")
-        core.count("no_number", int(table.id[row] == 0))
+    _number_tracks(core, (phase != TrackPhase.TENTATIVE) & ~ended)
     end_tracks(core, ended)
+
+
+def _number_tracks(core: Core, shown: Array) -> None:
+    """Give the tracks of the mask (n,) that have none an id and, where numbers are given, a number.
+
+    A track for which no number was left is counted once and takes the first that becomes free.
+    """
+    table, n = core.table, core.table.n
+    fresh = np.flatnonzero(shown & (table.id[:n] == 0))
+    core.count("confirmed", len(fresh))
+    table.id[fresh] = core.numbers.new_ids(len(fresh))
+    rows = np.flatnonzero(shown & (table.number[:n] == 0))
+    if core.numbers.last and len(rows):
+        table.number[rows] = core.numbers.take(len(rows), core.time)
+        core.count("no_number", int((table.number[fresh] == 0).sum()))
 
 
 def _learn_false_plots(core: Core, ended: Array) -> None:
@@ -219,9 +232,8 @@ def _learn_false_plots(core: Core, ended: Array) -> None:
 def end_tracks(core: Core, ended: Array) -> None:
     """End the tracks of the mask (n,)."""
     if ended.any():
-        numbers = core.column("id")[ended]
-        core.count("ended", int((numbers > 0).sum()))
-        core.numbers.give_back(numbers[numbers > 0], core.time)
+        core.count("ended", int((core.column("id")[ended] > 0).sum()))
+        core.numbers.give_back(core.column("number")[ended], core.time)
         core.table.keep(~ended)
 
 
@@ -256,9 +268,9 @@ def make_core(
     radars: Sequence[RadarSite], nodes: Sequence[NodeSite], zones: ZoneLookup, settings: TrackerSettings,
     capacity: int, filter: FilterPart, associate: AssociatePart, lifecycle: LifecyclePart, classify: ClassifyPart,
 ) -> Core:  # fmt: skip
-    """An empty tracker state. Raises ValueError for a capacity that the track numbers cannot serve."""
-    if not 1 <= capacity <= TrackNumbers.LAST:
-        raise ValueError(f"capacity must lie between 1 and {TrackNumbers.LAST}")
+    """An empty tracker state. Raises ValueError for a capacity out of bounds."""
+    if not 1 <= capacity <= LARGEST_CAPACITY:
+        raise ValueError(f"capacity must lie between 1 and {LARGEST_CAPACITY}")
     return Core(
         radars=tuple(radars),
         nodes=tuple(nodes),
@@ -269,7 +281,7 @@ def make_core(
         classify=classify,
         settings=settings,
         table=TrackTable(capacity, len(radars)),
-        numbers=TrackNumbers(),
+        numbers=TrackNumbers(LAST_ASTERIX_NUMBER if settings.reporting.asterix_numbers else 0),
         clocks=[RadarClock(one.video.period_s) for one in radars],
         waiting=[Plots.empty() for _ in radars],
         false_plots=[FalsePlots.around(one) for one in radars],

@@ -7,6 +7,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+LARGEST_CAPACITY = 1_000_000
+"""Tracks: a hundred times what the largest airport has, false ones included. They take 0.4 gigabytes; what asks
+for more is a typing error."""
+
 
 @dataclass(frozen=True)
 class TimingSettings:
@@ -159,12 +163,15 @@ class ReportingSettings:
     """Which tracks are shown, and what is said of them.
 
     fixed_off_pavement: show tracks by radar alone off the pavement that never moved: masts and fences look so.
+    asterix_numbers: give each track that is shown a number 1 .. 4095 besides its id. Off, since an id that never comes
+    again names one target for good; only an ASTERIX output has no room for it.
     moved_by: m, how far beyond half its extent a track must come from where it began to count as moved; the centroid
     of what stands strays by less. source_memory: s for which a sensor's contribution is shown. Tied to a one-second
     antenna: five turns.
     """
 
     fixed_off_pavement: bool = False
+    asterix_numbers: bool = False
     moved_by: float = 30.0
     source_memory: float = 5.0
 

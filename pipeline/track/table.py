@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,8 @@ NEVER = -np.inf
 
 _COLUMNS: dict[str, tuple[str, tuple[int, ...], Any]] = {
     "uid": ("i8", (), 0),
-    "id": ("i4", (), 0),
+    "id": ("i8", (), 0),
+    "number": ("u2", (), 0),
     "time": ("f8", (), 0.0),
     "state": ("f8", (4,), 0.0),
     "covariance": ("f8", (4, 4), 0.0),
@@ -71,6 +71,7 @@ class TrackTable:
 
     uid: Array
     id: Array
+    number: Array
     time: Array
     state: Array
     covariance: Array
@@ -149,42 +150,3 @@ class TrackTable:
             getattr(self, name)[:n] = saved[name]
         self.looked[:, :n] = saved["looked"]
         self.n, self.last_uid = n, int(saved["last_uid"])
-
-
-LAST_NUMBER = 4095
-"""The greatest track number: ASTERIX CAT010 has 12 bits for it (I010/161)."""
-
-
-@dataclass(slots=True, eq=False)
-class TrackNumbers:
-    """Numbers 1 .. 4095 given in turn, so that the longest unused comes next.
-
-    rest: s for which a number stays unused after its track ended, so that a controller does not take one target for
-    another; two minutes, as 4095 numbers suffice for it. free_at: (4096,) UTC s from which each number may be given
-    again; infinite while a track bears it.
-    """
-
-    LAST: ClassVar[int] = LAST_NUMBER
-
-    rest: float = 120.0
-    next: int = 1
-    free_at: Array = field(default_factory=lambda: np.full(LAST_NUMBER + 1, NEVER))
-
-    def take(self, time: float) -> int:
-        """The next free number, 0 when none is free."""
-        turn = np.r_[self.next : self.LAST + 1, 1 : self.next]
-        free = turn[self.free_at[turn] <= time]
-        if not len(free):
-            free = turn[np.isfinite(self.free_at[turn])]
-            if not len(free):
-                return 0
-            free = free[np.argsort(self.free_at[free], kind="stable")]
-        number = int(free[0])
-        self.free_at[number] = np.inf
-        self.next = number % self.LAST + 1
-        return number
-
-    def give_back(self, numbers: Array, time: float) -> None:
-        """These numbers are free after their rest."""
-        self.free_at[numbers] = time + self.rest
-        self.free_at[0] = NEVER

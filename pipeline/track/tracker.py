@@ -25,7 +25,10 @@ from pipeline.track.report_update import take_target_reports
 from pipeline.track.settings import TrackerSettings
 from pipeline.track.table import NEVER
 
-_SAME = ("id", "phase", "updated", "born", "hits", "misses", "altitude", "on_ground", "category", "address", "callsign")
+_SAME = (
+    "id", "number", "phase", "updated", "born", "hits", "misses", "altitude", "on_ground", "category", "address",
+    "callsign",
+)  # fmt: skip
 """Columns that the table of tracks handed out has as they are in the track table."""
 
 _SAVED = ("numbers", "clocks", "waiting", "false_plots", "undecided", "time", "lifecycle_time", "maintenance_time")
@@ -37,7 +40,8 @@ class Tracker:
 
     airport, radars, nodes: where things are; the `radar` and `node` of tables are indices into these.
     filter, associate, lifecycle, classify: parts (see `pipeline.contracts`). capacity: tracks at most,
-    tentative ones included, up to 4095. zones: where on the airport a point lies; made from the airport when not given.
+    tentative ones included, up to LARGEST_CAPACITY. zones: where on the airport a point lies; made from the airport
+    when not given.
     counters: what was dropped or done, by reason; numbers only grow.
     Raises ValueError for a capacity out of bounds.
     """

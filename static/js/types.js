@@ -3,7 +3,8 @@
 /**
  * A track as it stands on the wire (`GET /api/v1/picture`, topic `tracks`). Absent values are null.
  * @typedef {object} Track
- * @property {number} id
+ * @property {number} id  never given again in a run of the service
+ * @property {number|null} [number]  ASTERIX track number, shown in place of the id
  * @property {number} time  UTC seconds of the state
  * @property {number|null} lat
  * @property {number|null} lon
@@ -29,7 +30,8 @@
 
 /**
  * @typedef {object} AlertTarget
- * @property {number} track
+ * @property {number} track  its id
+ * @property {number|null} [number]  its ASTERIX track number
  * @property {string|null} [callsign]
  * @property {string|null} [class]
  * @property {number|null} [east_m]

@@ -105,7 +105,7 @@ def test_the_radar_picture_is_a_png(demo: Airside) -> None:
 @pytest.mark.parametrize(
     ("method", "path", "body", "status"),
     [
-        ("GET", "/api/v1/tracks/999999", None, 422),
+        ("GET", f"/api/v1/tracks/{2**53}", None, 422),
         ("GET", "/api/v1/tracks/4095", None, 404),
         ("GET", "/api/v1/radars/none/video.png", None, 404),
         ("POST", "/api/v1/alerts/999999/acknowledge", b'{"by": "x"}', 404),

@@ -123,7 +123,7 @@ def matched(one: Tracks, other: Tracks) -> tuple[Array, Array]:
 def raised(change: AlertChange) -> RaisedAlert:
     """An alert as it was raised."""
     alert = change.alert
-    names = tuple(target.callsign or f"{target.category} {target.track}" for target in alert.targets)
+    names = tuple(target.callsign or f"{target.category} {target.number or target.track}" for target in alert.targets)
     return RaisedAlert(change.time, alert.rule, alert.runway or "", alert.stage, names)
 
 

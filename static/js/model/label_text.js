@@ -5,8 +5,11 @@ import { STANDING_MPS } from './motion.js';
 
 /** @typedef {import('../types.js').Track} Track */
 
+/** @param {Track} track @returns {string} its ASTERIX track number; its id where it has none */
+export const numberOf = (track) => `#${track.number ?? track.id}`;
+
 /** @param {Track} track @returns {string} the name a controller calls it by: callsign, else the track number */
-export const nameOf = (track) => (track.callsign && track.callsign.trim()) || `#${track.id}`;
+export const nameOf = (track) => (track.callsign && track.callsign.trim()) || numberOf(track);
 
 /** A target missed for less than this is shown as seen: one turn without an echo is ordinary, s. */
 export const COAST_SHOWN_S = 1.5;

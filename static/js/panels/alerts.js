@@ -82,7 +82,7 @@ export class AlertPanel {
     setText(part('.alert-runway'), alert.runway ? `RWY ${alert.runway}` : '');
     setText(part('.alert-age'), isNumber(alert.raised_at) ? duration(this.picture.time - alert.raised_at) : '');
     setText(part('.alert-text'), alert.text || RULES[alert.rule] || alert.rule);
-    const names = alert.targets.map((one) => one.callsign || `#${one.track}`).join(' · ');
+    const names = alert.targets.map((one) => one.callsign || `#${one.number ?? one.track}`).join(' · ');
     const eta = isNumber(alert.time_to_threshold_s) ? `  threshold in ${duration(alert.time_to_threshold_s).replace(' ', '\u00a0')}` : '';
     setText(part('.alert-detail'), [`${names}${eta}`, `since ${clock(alert.raised_at)}${alert.holding_point ? `  hold ${alert.holding_point}` : ''}${alert.degraded ? '  degraded' : ''}${alert.simulated ? '  SIM' : ''}`].filter(Boolean).join('\n'));
     const button = /** @type {HTMLButtonElement} */ (part('.alert-ack'));

@@ -1,7 +1,7 @@
 // The list of all targets, with search.
 
 import { knots, number } from '../model/format.js';
-import { classOf, isCoasting, isStanding, nameOf, placeOf } from '../model/label_text.js';
+import { classOf, isCoasting, isStanding, nameOf, numberOf, placeOf } from '../model/label_text.js';
 import { coastedS } from '../model/motion.js';
 import { byId, el, keyed, setText } from './dom.js';
 
@@ -16,7 +16,7 @@ const SHOWN = 200;
  */
 export function matches(track, words, kind) {
   if (kind && (kind === 'moving' ? isStanding(track) : classOf(track) !== kind)) return false;
-  const text = `${nameOf(track)} #${track.id} ${track.address ?? ''} ${track.runway ?? ''} ${track.zone ?? ''} ${track.phase ?? ''}`.toLowerCase();
+  const text = `${nameOf(track)} ${numberOf(track)} ${track.address ?? ''} ${track.runway ?? ''} ${track.zone ?? ''} ${track.phase ?? ''}`.toLowerCase();
   return words.toLowerCase().split(/\s+/).every((one) => text.includes(one));
 }
 

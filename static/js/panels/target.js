@@ -1,7 +1,7 @@
 // Everything that is known of the selected target.
 
 import { angle, bearing, clock, feet, knots, number } from '../model/format.js';
-import { classOf, nameOf, placeOf } from '../model/label_text.js';
+import { classOf, nameOf, numberOf, placeOf } from '../model/label_text.js';
 import { byId, el, setText } from './dom.js';
 
 /** @typedef {import('../types.js').Track} Track */
@@ -27,6 +27,8 @@ export class TargetPanel {
   /** @param {import('../feed/picture.js').PictureState} picture @param {{onClose: () => void, onFollow: () => void, onCentre: () => void}} hooks */
   constructor(picture, hooks) {
     this.picture = picture;
+    /** @type {Track|null} what was shown last */
+    this.last = null;
     this.panel = byId('target');
     this.name = byId('target-name');
     this.table = byId('target-table');
@@ -44,12 +46,13 @@ export class TargetPanel {
     if (selected === null) return;
     byId('target-follow').setAttribute('aria-pressed', String(following));
     if (!track) {
-      setText(this.name, `#${selected} – gone`);
+      setText(this.name, `${this.last?.id === selected ? numberOf(this.last) : `#${selected}`} – gone`);
       this.panel.classList.add('is-gone');
       return;
     }
     this.panel.classList.remove('is-gone');
-    setText(this.name, `${nameOf(track)}${track.callsign ? `  #${track.id}` : ''}`);
+    this.last = track;
+    setText(this.name, `${nameOf(track)}${track.callsign ? `  ${numberOf(track)}` : ''}`);
     const rows = rowsOf(track);
     const known = new Set(rows.map(([key]) => key));
     for (const [key, cell] of this.cells) if (cell.parentElement) cell.parentElement.hidden = !known.has(key);

@@ -23,7 +23,7 @@ from app.settings import LimitsSettings, NodeSettings, StorageSettings
 from app.store import schema
 from app.store.batch import Queue
 from app.store.database import migrate, open_engine
-from app.store.store import Store
+from app.store.store import Store, _Due
 from pipeline.picture import Picture, SensorState
 from pipeline.tables import NodeEvents, Tracks
 from tests.support.fake_service import FakeService
@@ -181,6 +181,57 @@ def test_the_schema_and_the_migrations_agree(url: str) -> None:
     with engine.connect() as connection:
         assert compare_metadata(MigrationContext.configure(connection), schema.metadata) == []
     engine.dispose()
+
+
+def test_tracks_stored_before_ids_had_64_bits_are_kept(url: str) -> None:
+    migrate(url, "0001")
+    engine = open_engine(url)
+    with engine.begin() as connection:
+        connection.execute(
+            text(
+                "INSERT INTO tracks (airport, mode, track_id, born, first_time, last_time, category, simulated) "
+                f"VALUES ('{small_airport().icao}', 'live', 17, {T0}, {T0}, {T0}, 1, true)"
+            )
+        )
+    engine.dispose()
+    with opened(url) as store:
+        store.record(Picture(T0 + 1, tracks_at(T0 + 1, [2**40]).replace(number=4095)), ())
+    with opened(url) as store:
+        assert [(one["id"], one["number"]) for one in store.tracks(None, None)] == [(2**40, 4095), (17, None)]
+        found = store.track_history(2**40, None, None, 5)
+        assert found is not None
+        assert len(found["points"]) == 1
+
+
+def test_the_last_number_of_a_track_is_stored(sqlite_url: str) -> None:
+    with opened(sqlite_url) as store:
+        for k, number in enumerate((0, 17, 18)):
+            store.record(Picture(T0 + k, tracks_at(T0 + k, [5000]).replace(number=number)), ())
+    with opened(sqlite_url) as store:
+        assert [(one["id"], one["number"]) for one in store.tracks(None, None)] == [(5000, 18)]
+
+
+def test_what_is_due_for_a_point_is_known_of_any_id_in_any_order() -> None:
+    due = _Due(1.0)
+    ids = [2**62, 3, 2**33, 4]
+    assert due.choose(tracks_at(T0, ids), T0).all()
+    assert not due.choose(tracks_at(T0 + 0.5, ids), T0 + 0.5).any()
+    assert due.choose(tracks_at(T0 + 0.5, [5, *ids[::-1], 2]), T0 + 0.5).tolist() == [True, *[False] * 4, True]
+    assert due.choose(tracks_at(T0 + 1.0, [3, 5]), T0 + 1.0).tolist() == [True, False]
+    assert due.choose(tracks_at(T0 + 1.1, [3], born=T0 + 1), T0 + 1.1).all()
+    assert not due.choose(Tracks.empty(), T0 + 2).size
+
+
+def test_tracks_that_are_gone_for_long_are_not_remembered_for_ever() -> None:
+    due = _Due(1.0)
+    for k in range(20):
+        due.choose(tracks_at(T0 + 600.0 * k, [7, 1000 + k]), T0 + 600.0 * k)
+    assert len(due._ids) < 10
+    standing = tracks_at(T0, [9])
+    assert due.choose(standing, T0 + 12000).all()
+    for k in range(1, 20):  # it has no news, however many come and go beside it
+        shown = Tracks.concatenate([standing, tracks_at(T0, [2000 + k])])
+        assert due.choose(shown, T0 + 12000 + 600.0 * k).tolist() == [False, True]
 
 
 def test_old_rows_are_deleted(url: str) -> None:

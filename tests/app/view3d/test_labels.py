@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ def target(id: int, east: float = 0.0, north: float = 0.0, **values: object) -> 
         "height": 0.0, "speed": 0.0, "size": 10.0, "name": f"AB{id}", "category": 1, "on_runway": False,
         "coasting": False, "simulated": False, "stage": None, **values,
     }  # fmt: skip
-    return Target(id=id, row=0, east=east, north=north, **given)  # type: ignore[arg-type]
+    return Target(id=id, number=id, row=0, east=east, north=north, **given)  # type: ignore[arg-type]
 
 
 def eye_to_the_north(height: float = 60.0) -> Eye:
@@ -44,6 +45,10 @@ def test_never_more_than_forty_and_no_target_twice(targets: list[Target], with_e
     chosen = choose(targets, {1, 2, 3}, eye_to_the_north() if with_eye else None)
     assert len(chosen) <= MOST
     assert len({one.id for one in chosen}) == len(chosen)
+
+
+def test_a_label_without_a_name_shows_the_number() -> None:
+    assert label_text(replace(target(70_001, name=""), number=17)) == "#17"
 
 
 def test_forty_is_forty() -> None:

@@ -77,6 +77,11 @@ def test_a_place_left_is_taken_again_last_so_a_late_click_still_finds_who_was_th
     assert slots.bearer(3) is None
 
 
+def test_a_target_is_called_by_its_number_and_by_its_id_where_it_has_none() -> None:
+    frame = Movers().arrange(picture(tracks([70_001, 70_002], number=np.array([17, 0]))))
+    assert {id: one.number for id, one in frame.targets.items()} == {70_001: 17, 70_002: 70_002}
+
+
 def test_instances_stay_when_others_come_and_go() -> None:
     movers = Movers()
     movers.arrange(picture(tracks([10, 11, 12], category=1, heading=0.0)))

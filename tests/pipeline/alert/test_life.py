@@ -248,6 +248,16 @@ def test_rows_that_are_not_finite_and_unknown_nodes_do_no_harm() -> None:
     assert watch.update(tracks, float("nan"))[0].operation == "raise"
 
 
+@pytest.mark.parametrize(("number", "called"), [(0, 70_003), (17, 17)])
+def test_a_text_calls_a_target_by_its_number_and_keeps_its_id(number: int, called: int) -> None:
+    movers = [arrival(1, 60), parked(3, 200, 0)]
+    tracks = tracks_at(movers, 45.0)
+    tracks = tracks.replace(id=tracks.id + 70_000, number=np.array([0, number]))
+    alert = monitor().update(tracks, 45.0)[0].alert
+    assert f"Vehicle {called} on runway" in alert.text
+    assert {one.track: one.number for one in alert.targets} == {70_001: None, 70_003: number or None}
+
+
 def test_a_hundred_random_pictures_break_nothing() -> None:
     rng = np.random.default_rng(7)
     watch = monitor()

@@ -7,7 +7,6 @@ from pipeline.classify.extent_speed import ExtentSpeed
 from pipeline.lifecycle.m_of_n import MOfN
 from pipeline.lifecycle.score import Score
 from pipeline.tables import TargetClass, TrackPhase
-from pipeline.track.table import TrackNumbers
 from tests.pipeline.contracts.track import ClassifyContract, LifecycleContract
 
 
@@ -90,14 +89,3 @@ def test_score_settings_out_of_bounds(words: dict[str, float]) -> None:
 def test_classify_settings_out_of_bounds(words: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="must"):
         ExtentSpeed(**words)
-
-
-def test_numbers_come_in_turn_and_rest_before_they_come_again() -> None:
-    numbers = TrackNumbers(rest=100.0)
-    assert [numbers.take(0.0) for _ in range(3)] == [1, 2, 3]
-    numbers.give_back(np.array([1, 2]), 10.0)
-    rest = [numbers.take(50.0) for _ in range(4092)]
-    assert rest == list(range(4, 4096))
-    assert numbers.take(50.0) == 1  # none has rested, so the one that rests longest
-    assert numbers.take(120.0) == 2
-    assert numbers.take(1e6) == 0  # all are borne

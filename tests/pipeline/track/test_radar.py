@@ -8,6 +8,7 @@ import pytest
 from pipeline.airport.model import SurfaceKind
 from pipeline.sites import RadarSite
 from pipeline.tables import SectorPlots, Source, TargetClass, TrackPhase, Tracks, VideoFormat
+from pipeline.track.settings import LARGEST_CAPACITY
 from tests.pipeline.track.scene import (
     RADAR,
     T0,
@@ -344,7 +345,7 @@ def test_more_targets_than_room_are_counted() -> None:
     assert tracker.counters["no_room"] > 0
 
 
-@pytest.mark.parametrize("capacity", [0, 4096])
+@pytest.mark.parametrize("capacity", [0, LARGEST_CAPACITY + 1])
 def test_capacity_out_of_bounds(capacity: int) -> None:
     with pytest.raises(ValueError, match="capacity"):
         make_tracker(capacity=capacity)

@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { angle, bearing, clock, compact, countdown, distance, duration, knots, number } from '../../../static/js/model/format.js';
-import { labelText } from '../../../static/js/model/label_text.js';
+import { labelText, nameOf, numberOf } from '../../../static/js/model/label_text.js';
 import { SLOTS, placeLabels, slotOffset } from '../../../static/js/model/placement.js';
 import { roundLength } from '../../../static/js/draw/overlay.js';
 
@@ -85,6 +85,13 @@ test('label texts: names, null-safe, coasting age, simulated mark', () => {
   assert.equal(labelText({ ...bare, phase: 'coasting' }, 'short', 0).second, '');
   assert.equal(labelText({ ...bare, phase: 'tentative' }, 'short', 0).first, '#17?');
   assert.equal(labelText({ ...bare, zone: 'way/123456' }, 'full', 0).second, '');
+});
+
+test('a track is called by its ASTERIX number, and by its id where it has none', () => {
+  assert.equal(numberOf({ ...bare, id: 2 ** 40, number: 17 }), '#17');
+  assert.equal(numberOf({ ...bare, id: 2 ** 40, number: null }), '#1099511627776');
+  assert.equal(nameOf({ ...bare, id: 5000, number: 17 }), '#17');
+  assert.equal(nameOf({ ...bare, id: 5000, number: 17, callsign: 'AFR1' }), 'AFR1');
 });
 
 test('numbers as text', () => {
