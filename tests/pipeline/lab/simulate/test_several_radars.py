@@ -48,6 +48,7 @@ def test_a_radar_sees_every_target_once_a_turn_where_it_is_then() -> None:
     chance, antennas, targets = scene(2)
     for antenna, period in zip(antennas, PERIODS, strict=True):
         seen = observe(chance, antenna, targets, SECONDS, SHARP)
+        assert EPOCH <= seen.plots.time.min() <= seen.plots.time.max() < EPOCH + SECONDS
         for target in range(len(targets.start)):
             plots = seen.plots[seen.target == target]
             assert abs(len(plots) - SECONDS / period) <= 1
