@@ -167,7 +167,7 @@ class TrackerSettings(Section):
         2048,
         ge=1,
         le=LARGEST_CAPACITY,
-        description="tracks at most, those not confirmed yet included; each takes 0.4 kB of memory, and 8 bytes for "
+        description="tracks at most, those not confirmed yet included; each takes 0.7 kB of memory, and 0.1 kB for "
         "each radar, from the start on; targets without room are counted as no_room",
     )
     asterix_numbers: bool = Field(

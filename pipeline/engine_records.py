@@ -23,8 +23,9 @@ from pipeline.situation.holds import HoldMemory
 from pipeline.tables import SectorPlots, Sweeps, Tracks
 from pipeline.tables.arrays import Array, Floats
 from pipeline.track.false_plots import FalsePlots
-from pipeline.track.look import RadarClock
+from pipeline.track.latency import Latencies
 from pipeline.track.numbers import TrackNumbers
+from pipeline.track.radar_clock import RadarClock
 from pipeline.values import ValueCodec
 
 
@@ -68,7 +69,7 @@ CODEC = ValueCodec(
     (
         Envelope, SectorPlots, Tick, ClockStep, SensorHealth, PartsChanged, Acknowledge, SetRunway,
         Shown, Alert, AlertTarget, AlertChange, RunwayState, SensorState,
-        EngineState, RadarClock, FalsePlots, TrackNumbers, MonitorState, Case, Conflict, HoldMemory, Entry,
+        EngineState, RadarClock, FalsePlots, TrackNumbers, Latencies, MonitorState, Case, Conflict, HoldMemory, Entry,
         ChainBlock, ChainState, Sweeps,
     )
 )  # fmt: skip

@@ -65,6 +65,7 @@ def intake_router(context: Context) -> APIRouter:
     async def target_reports(request: Request) -> Response:
         """Positions that cooperative sensors give (ADS-B, multilateration, vehicle beacons).
 
+        `source` names the sensor or feed that a report came through: at most 16 ASCII letters, digits, `_`, `-`, `.`.
         Reports whose time is too far from that of their arrival are refused and counted by reason, the others taken.
         """
         body = await _body(request, JSON)

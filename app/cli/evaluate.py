@@ -26,7 +26,11 @@ def evaluate(
         str, typer.Option(help="Where trials run: loky (processes), threading, or dask (a cluster).")
     ] = "loky",
     file: Annotated[
-        Path | None, typer.Option(help="A recording (.npz of scans and t), for experiments on recorded video.")
+        Path | None,
+        typer.Option(
+            help="A recording: .npz of scans and t for experiments on recorded video, JSON target reports"
+            " (an array or one a line, may be gzipped) for those on recorded reports."
+        ),
     ] = None,
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the tables as JSON.")] = None,
     markdown: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the tables as Markdown.")] = None,

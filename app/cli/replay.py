@@ -45,6 +45,9 @@ Change = Annotated[
         "--set", metavar="KEY=VALUE", help="Journal: run with another setting, such as parts.lifecycle=m_of_n."
     ),
 ]
+JsonFile = Annotated[
+    Path | None, typer.Option("--json", metavar="FILE", help="Journal, with --headless: write what is found as JSON.")
+]
 HttpPort = Annotated[
     int,
     typer.Option("--http-port", envvar="AIRSIDE_PORT", min=0, max=65535, help="Journal: port of the displays."),
@@ -71,6 +74,7 @@ def replay(
     begin: From = None,
     until: Until = None,
     change: Change = None,
+    json: JsonFile = None,
     http_port: HttpPort = 8000,
     radar: Radar = None,
     to: To = None,
@@ -95,11 +99,12 @@ def replay(
     from app.replay.command import is_journal
 
     console = Console()
-    asked = verify or begin or until or change
+    asked = verify or begin or until or change or json
     if is_journal(file) or (asked and file.is_dir()):
-        _replay_journal(console, file, speed, headless, verify, (begin, until), tuple(change or ()), http_port)
+        changes = tuple(change or ())
+        _replay_journal(console, file, speed, headless, verify, (begin, until), changes, json, http_port)
     elif asked:
-        raise fail(f"{file}: --verify, --from, --until and --set are for journals (.mcap)")
+        raise fail(f"{file}: --verify, --from, --until, --set and --json are for journals (.mcap)")
     else:
         _replay_video(console, file, speed, headless, (radar, to), loop, port, settings)
 
@@ -146,6 +151,7 @@ def _replay_journal(
     verify: bool,
     times: tuple[str | None, str | None],
     change: tuple[str, ...],
+    json: Path | None,
     port: int,
 ) -> None:
     from app.console import fail
@@ -155,7 +161,11 @@ def _replay_journal(
     from app.settings import SettingsError
 
     try:
-        work = JournalReplay(console, path, times, change)
+        if json is not None:
+            if not headless:
+                raise SettingsError("--json goes with --headless")
+            _check(json)
+        work = JournalReplay(console, path, times, change, json)
         if verify and (change or not headless):
             raise SettingsError("--verify goes with --headless, and not with --set")
         if verify:
@@ -169,6 +179,16 @@ def _replay_journal(
     except KeyboardInterrupt:
         raise typer.Exit(130) from None
     raise typer.Exit(status)
+
+
+def _check(json: Path) -> None:
+    from app.output_files import check_writable
+    from app.settings import SettingsError
+
+    try:
+        check_writable(json)
+    except ValueError as error:
+        raise SettingsError(str(error)) from error
 
 
 def _describe(console: Console, recording: Recording) -> None:

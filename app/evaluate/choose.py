@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from pipeline.lab import evaluate
-from pipeline.lab.evaluate import Experiment, RecordedVideo
+from pipeline.lab.evaluate import Experiment, RecordedReports, RecordedVideo
 
 ALL = "all"
 
@@ -25,29 +26,39 @@ class Chosen:
 
 
 def needs_video(kind: type[Any]) -> bool:
-    """Whether an experiment works on a recording."""
+    """Whether an experiment works on recorded video."""
     return any(one.name == "video" for one in fields(kind))
 
 
-def choose(name: str, *, quick: bool, trials: int | None, video: RecordedVideo | None) -> Chosen:
+def needs_reports(name: str) -> bool:
+    """Whether the experiment called so works on recorded target reports; False where there is none of that name."""
+    kind = evaluate.experiments().get(name)
+    return kind is not None and any(one.name == "reports" for one in fields(kind))
+
+
+def choose(
+    name: str, *, quick: bool, trials: int | None, video: RecordedVideo | None,
+    reports: Callable[[], RecordedReports],
+) -> Chosen:  # fmt: skip
     """The experiment called `name`, or all of them, short when `quick`, each with so many trials if given.
 
-    video: handed to experiments that work on a recording. Raises UnknownExperiment.
+    video, reports: handed to experiments that work on a recording of them. Raises UnknownExperiment.
     """
     known = evaluate.experiments()
+    given = {one: {"reports": reports()} for one in known if name in (one, ALL) and needs_reports(one)}
     if name == ALL:
         if not known:
             raise UnknownExperiment("there are no experiments")
         names = [one for one, kind in known.items() if video is not None or not needs_video(kind)]
         left = tuple(f"{one} is left out: it needs a recording (--file)" for one in known if one not in names)
-        return Chosen({one: _made(known[one], quick, trials, video) for one in names}, left)
+        return Chosen({one: _made(known[one], quick, trials, video, given.get(one, {})) for one in names}, left)
     if name not in known:
         raise UnknownExperiment(f"no experiment is called {name!r}{nearest(name, [*known, ALL])}")
     if video is None and needs_video(known[name]):
         raise UnknownExperiment(f"{name} works on a recording: name one with --file")
     if video is not None and not needs_video(known[name]):
         raise UnknownExperiment(f"{name} does not work on a recording: leave out --file")
-    return Chosen({name: _made(known[name], quick, trials, video)})
+    return Chosen({name: _made(known[name], quick, trials, video, given.get(name, {}))})
 
 
 def nearest(word: str, among: list[str]) -> str:
@@ -56,8 +67,10 @@ def nearest(word: str, among: list[str]) -> str:
     return f"; did you mean {close[0]!r}?" if close else f"; there are: {', '.join(sorted(among))}"
 
 
-def _made(kind: type[Any], quick: bool, trials: int | None, video: RecordedVideo | None) -> Experiment:
-    made = kind(video=video) if needs_video(kind) else kind()
+def _made(
+    kind: type[Any], quick: bool, trials: int | None, video: RecordedVideo | None, given: dict[str, Any]
+) -> Experiment:
+    made = kind(video=video, **given) if needs_video(kind) else kind(**given)
     if quick:
         made = made.quick()
     if trials is not None:

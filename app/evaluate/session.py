@@ -6,16 +6,18 @@ import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import joblib
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from app.evaluate.choose import ALL, choose
+from app.evaluate.choose import ALL, choose, needs_reports
 from app.evaluate.circumstances import Circumstances, circumstances
 from app.evaluate.documents import document, markdown
 from app.evaluate.recorded import name_of, recorded_video
+from app.evaluate.reported import recorded_reports, shipped_reports
 from app.evaluate.runs import EvaluationError, Run, carry_out, usable_backend
 from app.evaluate.table import summary, told
 from app.output_files import check_writable, json_text, write_whole
@@ -72,8 +74,15 @@ def run_all(console: Console, options: Options) -> list[str]:
     Raises UnknownExperiment, RecordingError, OSError.
     """
     about = circumstances(options.command)
-    video = recorded_video(options.file) if options.file is not None else None
-    chosen = choose(options.name, quick=options.quick, trials=options.trials, video=video)
+    file = options.file
+    of_reports = file is not None and needs_reports(options.name)
+    chosen = choose(
+        options.name,
+        quick=options.quick,
+        trials=options.trials,
+        video=recorded_video(file) if file is not None and not of_reports else None,
+        reports=partial(recorded_reports, file) if file is not None and of_reports else shipped_reports,
+    )
     if options.report is not None:
         options.report.mkdir(parents=True, exist_ok=True)
     for line in chosen.left_out:

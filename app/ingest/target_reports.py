@@ -2,7 +2,8 @@
 
 One object or an array of objects: `time` (Unix seconds or ISO 8601 with zone), `lat`, `lon` (degrees, WGS 84), and,
 where known, `address` (24-bit, six hex digits), `callsign`, `speed_mps`, `course_deg`, `altitude_m` (above the
-airport), `on_ground`, `category` (`aircraft`, `vehicle`, `unknown`), `accuracy_m`, `simulated`.
+airport), `on_ground`, `category` (`aircraft`, `vehicle`, `unknown`), `accuracy_m`, `simulated`, `source` (the sensor or
+feed that it came through, such as `adsb` or `mlat-1`: at most 16 ASCII letters, digits, `_`, `-` and `.`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from pipeline.tables import TargetCategory, TargetReports
 
 _ADDRESS = re.compile(r"[0-9a-fA-F]{6}")
 _CALLSIGN = re.compile(r"[A-Z0-9 _.-]{0,8}")
+_SOURCE = re.compile(r"[A-Za-z0-9_.-]{0,16}")
 
 
 class TargetReportRow(msgspec.Struct, forbid_unknown_fields=True):
@@ -37,6 +39,7 @@ class TargetReportRow(msgspec.Struct, forbid_unknown_fields=True):
     category: Literal["unknown", "aircraft", "vehicle"] = "unknown"
     accuracy_m: float | int = 7.5
     simulated: bool = False
+    source: str | None = None
 
 
 def parse_target_reports(body: bytes, frame: LocalFrame, limit: int = 1000) -> TargetReports:
@@ -64,6 +67,7 @@ def parse_target_reports(body: bytes, frame: LocalFrame, limit: int = 1000) -> T
         on_ground=[row.on_ground for row in rows],
         category=[TargetCategory[row.category.upper()] for row in rows],
         simulated=[row.simulated for row in rows],
+        source=[_source(row.source, at) for row, at in zip(rows, where, strict=True)],
     )
 
 
@@ -80,3 +84,9 @@ def _callsign(text: str | None, where: str) -> str:
     if not _CALLSIGN.fullmatch(trimmed):
         raise BadMessage("bad_value", f"{where}: callsign must be at most eight letters and digits")
     return trimmed
+
+
+def _source(text: str | None, where: str) -> str:
+    if text is not None and not _SOURCE.fullmatch(text):
+        raise BadMessage("bad_value", f"{where}: source must be at most 16 letters, digits, '_', '-' and '.'")
+    return text or ""

@@ -244,11 +244,15 @@ class Journal:
                     return seconds(at)
         return None
 
-    def first_snapshot(self) -> float:
-        """UTC s of the first snapshot, before which nothing can be replayed. Raises JournalError when there is none."""
+    def first_snapshot(self, run: str | None = None) -> float:
+        """UTC s of the first snapshot (of a run), before which nothing can be replayed.
+
+        Raises JournalError when there is none.
+        """
         for file in self.files:
-            for at, _ in file.snapshots():
-                return at
+            for at, chunk in file.snapshots():
+                if run is None or file.chunks[chunk].run == run:
+                    return at
         raise JournalError(f"{self.name}: no snapshot in it, so that nothing can be replayed")
 
     def topics(self) -> frozenset[str]:

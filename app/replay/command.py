@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
@@ -14,9 +17,13 @@ from app.journal.names import JournalError, journal_files
 from app.journal.reader import Journal, open_journal
 from app.journal.recorder import versions
 from app.journal.times import moment, utc_text
+from app.output_files import json_text, write_whole
 from app.replay.compare import compare
 from app.replay.verify import Verification, verify
 from pipeline.tables import Tracks
+
+MOST_TOLD = 3
+"""Sentences about one matter that are printed in full."""
 
 
 def is_journal(path: Path) -> bool:
@@ -28,13 +35,19 @@ def is_journal(path: Path) -> bool:
 
 
 class JournalReplay:
-    """One journal and what is asked of it. times: from, until, as a person writes them.
+    """One journal and what is asked of it. times: from, until, as a person writes them. json: file that takes what
+    `verify` and `compare` find.
 
     Raises JournalError when it cannot be read or holds nothing.
     """
 
     def __init__(
-        self, console: Console, path: Path, times: tuple[str | None, str | None], change: tuple[str, ...]
+        self,
+        console: Console,
+        path: Path,
+        times: tuple[str | None, str | None],
+        change: tuple[str, ...],
+        json: Path | None = None,
     ) -> None:
         self.console = console
         self.journal: Journal = open_journal(path)
@@ -46,6 +59,7 @@ class JournalReplay:
         self.since = None if begin is None else moment(begin, start)
         self.until = None if until is None else moment(until, start)
         self.change = change
+        self.json = json
         for file in self.journal.files:
             if file.cut_off is not None:
                 console.print(
@@ -58,6 +72,8 @@ class JournalReplay:
         with self._progress("verifying") as hear:
             found = verify(self.journal, self.since, self.until, hear)
         self._tell(found)
+        self._tell_begun_empty(found.begun_empty)
+        self._write({**asdict(found), "begun_empty": len(found.begun_empty), "notes": found.begun_empty})
         if found.difference is None:
             self.console.print("[bold green]identical[/bold green]" if found.pictures else "nothing to compare")
             return 0 if found.pictures else 1
@@ -67,7 +83,10 @@ class JournalReplay:
     def compare(self) -> int:
         """Print what would have been different with the settings asked for; exit status 0."""
         with self._progress("replaying") as hear:
-            made = compare(self.journal, self.change, self.since, self.until, hear)
+            found = compare(self.journal, self.change, self.since, self.until, hear)
+        made = found.pictures
+        self._tell_begun_empty(found.begun_empty)
+        self._write(found.document())
         title = f"{made.pictures} pictures, {' '.join(self.change) or 'the recorded settings'}"
         table = Table(title=title, title_justify="left")
         table.add_column("")
@@ -109,6 +128,16 @@ class JournalReplay:
         other = [f"{name} {had} then, {here.get(name)} now" for name, had in then if here.get(name) != had]
         if other:
             self.console.print(f"[yellow]not the same versions: {'; '.join(other)}[/yellow]", highlight=False)
+
+    def _tell_begun_empty(self, sentences: Sequence[str]) -> None:
+        for one in sentences[:MOST_TOLD]:
+            self.console.print(f"[yellow]{escape(one)}[/yellow]", highlight=False)
+        if len(sentences) > MOST_TOLD:
+            self.console.print(f"[yellow]So it is at {len(sentences) - MOST_TOLD} further places.[/yellow]")
+
+    def _write(self, found: dict[str, Any]) -> None:
+        if self.json is not None:
+            write_whole(self.json, json_text(found))
 
     @contextmanager
     def _progress(self, what: str) -> Iterator[Callable[[float], None]]:

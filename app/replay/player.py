@@ -72,6 +72,7 @@ class JournalPlayer:
         self.newest: Picture | None = None
         self.begin_anew = begin_anew
         self.failed = ""
+        self.note = ""
         self._change, self._own = change, own
         self._wanted = _Wanted(True, _speed(speed), self.begin)
         self._condition = threading.Condition()
@@ -170,7 +171,7 @@ class JournalPlayer:
 
     def _shown(self, target: float) -> Iterator[tuple[Shown, tuple[AlertChange, ...], float]]:
         """The picture at `target` at once, then all that follow; fast forward from the snapshot before it."""
-        self._sensors = ()
+        self._sensors, self.note = (), ""
         replay = ReplayEngine(self.journal, self._change, self._own)
         newest: Shown | None = None
         reached = False
@@ -196,7 +197,10 @@ class JournalPlayer:
 
     def _take(self, record: Record, replay: ReplayEngine) -> None:
         if record.topic == SNAPSHOT and replay.lost:
+            told = len(replay.counts.begun_empty)
             replay.restore(record)
+            for self.note in replay.counts.begun_empty[told:]:
+                log.warning("%s", self.note)
         elif record.topic == SENSORS:
             states = CODEC.decode(record.data)
             if isinstance(states, tuple) and all(isinstance(one, SensorState) for one in states):

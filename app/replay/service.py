@@ -42,8 +42,8 @@ class ReplayService:
 
     def sensors(self) -> tuple[SensorState, ...]:
         """The health of the sensors as it was recorded, and that of the replay itself."""
-        failed = self.player.failed
-        own = SensorState("replay", "store", "degraded" if failed else "ok", self.player.state().time, detail=failed)
+        failed, time = self.player.failed, self.player.state().time
+        own = SensorState("replay", "store", "degraded" if failed else "ok", time, detail=failed or self.player.note)
         return (*self.player.sensors, own)
 
     def video(self, radar: str) -> Video:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
@@ -13,11 +14,13 @@ from app.journal.reader import Journal, Record
 from app.journal.times import utc_text
 from app.replay.recorded import RecordedRun, recorded_run
 from app.replay.video import VideoReplay
+from pipeline.alert.monitor import MonitorState
 from pipeline.engine import SurfaceEngine
 from pipeline.engine_records import CODEC, INPUT, OUTPUT, Shown, shown
 from pipeline.inputs import Envelope
 from pipeline.tables import SectorPlots, Tracks
-from pipeline.values import first_difference
+from pipeline.tables.codec import OtherFormError
+from pipeline.values import first_difference, other_form
 
 log = logging.getLogger(__name__)
 
@@ -28,7 +31,8 @@ T = TypeVar("T")
 class Replayed:
     """One input run again. recorded: what the live engine made of it, made: what this one does; None for nothing.
 
-    complete: the record of what the live engine made is there (the last input of a file that was cut off has none).
+    complete: the record of what the live engine made is there to be compared. The last input of a file that was cut
+    off has none, and those from which the state is only rebuilt (see `ReplayEngine`) are not compared.
     """
 
     record: Record
@@ -41,7 +45,10 @@ class Replayed:
 
 @dataclass
 class Verification:
-    """What was compared. difference: the first place where bits differ, in words; None: identical."""
+    """What was compared. difference: the first place where bits differ, in words; None: identical.
+
+    begun_empty: where the replay began with an empty engine because of the form of a recorded state, a sentence each.
+    """
 
     inputs: int = 0
     pictures: int = 0
@@ -55,6 +62,7 @@ class Verification:
     first: float | None = None
     last: float | None = None
     versions: dict[str, str] = field(default_factory=dict)
+    begun_empty: list[str] = field(default_factory=list)
 
     @property
     def columns(self) -> int:
@@ -67,6 +75,10 @@ class ReplayEngine:
 
     change: gives the run that is to be replayed for a recorded one. own: verbs of the radars' chains that take their
     parts from the settings; the engine is then given the plots of these chains in place of the recorded ones.
+
+    From a snapshot that an earlier version wrote in another form one cannot go on. The replay then begins with an empty
+    engine at the first snapshot of the run; what comes before the place asked for only rebuilds the state and is not
+    compared.
     """
 
     def __init__(
@@ -81,31 +93,38 @@ class ReplayEngine:
         self.engine: SurfaceEngine | None = None
         self.counts = Verification()
         self._change = change
+        self._run: RecordedRun | None = None
         self._id = ""
         self._sequence: int | None = None
         self.detection_difference: str | None = None
         """Where the plots of a chain were not those recorded."""
         self._lost = True
         """No state to go on from: at the begin, and after a gap, up to the next snapshot."""
+        self.begun_empty = False
+        """This run was begun with an empty engine: its later snapshots are not the states that are reached here."""
 
     def replayed(self, since: float | None = None, until: float | None = None) -> Iterator[Replayed | Record]:
         """Every input with both outcomes, and every other record as it stands, in order.
 
         Raises JournalError."""
         self.journal.first_snapshot()
+        begin, compared_from = self._begin(since)
         waiting: tuple[Record, Envelope, Shown | None] | None = None
-        for record in self.journal.records(since):
+        for record in self.journal.records(begin):
             if until is not None and record.time > until:
                 break
             self._follow(record)
             if record.topic == OUTPUT and waiting is not None and not self._lost:
-                recorded = self._decoded(record, Shown)
-                yield Replayed(waiting[0], waiting[1], recorded, waiting[2], record.data)
+                if record.order < compared_from:
+                    yield Replayed(*waiting[:2], None, waiting[2], None, complete=False)
+                else:
+                    yield Replayed(*waiting[:2], self._decoded(record, Shown), waiting[2], record.data)
                 waiting = None
                 continue
             if waiting is not None and (self._lost or record.topic in (INPUT, SNAPSHOT)):
                 # records are missing: what the live engine made of the last input is not known
-                yield Replayed(waiting[0], waiting[1], None, waiting[2], None, complete=not self._lost)
+                there = not self._lost and record.order >= compared_from
+                yield Replayed(*waiting[:2], None, waiting[2], None, complete=there)
                 waiting = None
             if record.topic == INPUT and not self._lost:
                 waiting = self._step(record)
@@ -114,16 +133,54 @@ class ReplayEngine:
                     self.video.take(record)
                 yield record
         if waiting is not None:
-            yield Replayed(waiting[0], waiting[1], None, waiting[2], None, complete=False)
+            yield Replayed(*waiting[:2], None, waiting[2], None, complete=False)
 
     def restore(self, snapshot: Record) -> None:
-        """Go on from a snapshot. Raises JournalError when it does not fit the engine."""
-        assert self.engine is not None
-        try:
-            self.engine.restore(CODEC.decode(snapshot.data))
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise JournalError(f"{self.journal.name}: the snapshot at {utc_text(snapshot.time)}: {error}") from error
+        """Go on from a snapshot, or with an empty engine where its form is another one than this version's.
+
+        An empty engine has no tracks; the use of the runways and the numbers of alerts it takes where they can be read.
+
+        Raises JournalError when it cannot be read, or does not fit the engine.
+        """
+        other = self._restored(snapshot)
+        if other is not None:
+            self.begun_empty = True
+            self.counts.begun_empty.append(
+                f"The state recorded at {utc_text(snapshot.time)} does not have the form of the engine that replays it"
+                f" ({other}), so that the replay begins there with an empty engine."
+            )
         self._lost = False
+
+    def _begin(self, since: float | None) -> tuple[float | None, float]:
+        """From where to read (None: the begin), and the place in the journal's time from which to compare."""
+        if since is None:
+            return None, -math.inf
+        snapshot = next(self.journal.records(since))
+        self._begin_run(snapshot.run)
+        if self._restored(snapshot) is None:
+            return since, -math.inf
+        return self.journal.first_snapshot(snapshot.run), snapshot.order
+
+    def _restored(self, snapshot: Record) -> str | None:
+        """Restore the engine; what in the snapshot is of another form, and the engine then is empty. See `restore`."""
+        assert self.engine is not None
+        assert self._run is not None
+        saved = None
+        try:
+            saved = CODEC.decode(snapshot.data)
+            self.engine.restore(saved)
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            self.engine = self._run.engine()  # the state may have been taken by half
+            other = str(error) if isinstance(error, OtherFormError) else None
+            if saved is not None:
+                other = other_form(saved, self.engine.save())
+            if other is None:
+                place = f"{self.journal.name}: the snapshot at {utc_text(snapshot.time)}"
+                raise JournalError(f"{place}: {error}") from error
+            if isinstance(saved, dict) and isinstance(monitor := saved.get("monitor"), MonitorState):
+                self.engine.monitor.restore(monitor.before_traffic())
+            return other
+        return None
 
     @property
     def lost(self) -> bool:
@@ -172,10 +229,10 @@ class ReplayEngine:
         return made
 
     def _begin_run(self, id: str) -> None:
-        self._id, self._lost, self._sequence = id, True, None
+        self._id, self._lost, self._sequence, self.begun_empty = id, True, None, False
         attached = next((got for one in self.journal.files if (got := one.attachments(id))), {})
         run = self._change(recorded_run(attached, self.journal.name))
-        self.engine = run.engine()
+        self._run, self.engine = run, run.engine()
         self.video = VideoReplay(run, self._own)
         self.counts.runs += 1
         self.counts.versions = run.versions
@@ -214,7 +271,7 @@ def verify(
                 counts.difference = _at_snapshot(replay, one)
         else:
             counts.difference = replay.detection_difference or _compared(one, counts)
-            counts.first = one.record.time if counts.first is None else counts.first
+            counts.first = one.record.time if counts.first is None and one.complete else counts.first
             counts.last = one.record.time
             progress(one.record.time)
         if counts.difference is not None:
@@ -226,7 +283,8 @@ def _compared(one: Replayed, counts: Verification) -> str | None:
     if not one.complete:
         return None
     made = None if one.made is None else CODEC.encode(one.made)
-    if made == one.recorded_octets:
+    # what was recorded before tables and classes had all that they have now is the same as far as it goes
+    if made == one.recorded_octets or (one.recorded is not None and CODEC.encode(one.recorded) == made):
         if one.made is not None:
             counts.pictures += one.made.time == one.made.time
             counts.changes += len(one.made.changes)
@@ -240,6 +298,8 @@ def _compared(one: Replayed, counts: Verification) -> str | None:
 
 def _at_snapshot(replay: ReplayEngine, snapshot: Record) -> str | None:
     """Restore from the snapshot where there is nothing to go on from; elsewhere it must be the state reached."""
+    if replay.begun_empty and not replay.lost:
+        return None
     replay.counts.snapshots += 1
     if replay.lost:
         replay.restore(snapshot)

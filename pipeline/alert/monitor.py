@@ -38,6 +38,10 @@ class MonitorState:
     held_back: int = 0
     held_back_total: int = 0
 
+    def before_traffic(self) -> MonitorState:
+        """A state that knows how the runways are used and which number the next alert has, and nothing else."""
+        return MonitorState(self.next_id, list(self.runways))
+
 
 class AlertMonitor:
     """Runs the rules on each new set of tracks and leads every alert from raise to clear.

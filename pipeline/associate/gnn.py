@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.contracts.associate import Assignment, Expected, Measured
+from pipeline.contracts.associate import Association, Expected
+from pipeline.contracts.measured import Hypotheses, Measured
 from pipeline.kernels.assignment import assign_sparse
 from pipeline.kernels.compiled import allocating
 from pipeline.tables.arrays import Array, Floats
@@ -48,108 +48,151 @@ class GlobalNearestNeighbour:
         """
         return -2.0 * math.log(2 * math.pi * self.new_density * (1 - self.detection) / self.detection)
 
-    def __call__(self, tracks: Expected, measured: Measured) -> Assignment:
-        """Assign (n tracks, m measurements), all pairs within gate and time window considered. O(pairs) memory."""
-        n, m = len(tracks.time), len(measured.time)
-        first = np.zeros(n + 1, dtype=np.int32)
-        chosen = np.full(n, -1, dtype=np.int32)
-        distance = np.full(n, np.nan)
-        if n == 0 or m == 0:
-            return Assignment(chosen, distance, first, np.empty(0, np.int32), np.empty(0))
-        arguments = (
-            tracks.time, tracks.state, tracks.covariance, tracks.window, tracks.extent,
-            measured.time, measured.position, measured.noise, self.gate, self.max_gate_m, self.extent_sd,
-        )  # fmt: skip
-        start, order, grid = _grid(measured.position, self.max_gate_m / CELLS_PER_GATE)
-        pairs = _gate(*arguments, start, order, grid, first, np.empty(0, np.int32), np.empty(0), np.empty(0), False)
-        pair, squared, log_det = np.empty(pairs, np.int32), np.empty(pairs), np.empty(pairs)
-        _gate(*arguments, start, order, grid, first, pair, squared, log_det, True)
-        cost = squared + log_det - self.log_likelihood_ratio + np.repeat(tracks.penalty, np.diff(first))
-        assign_sparse(first, pair, cost, m, chosen)
-        _taken(first, pair, squared, chosen, distance)
-        return Assignment(chosen, distance, first, pair, cost)
+    @property
+    def branching(self) -> bool:
+        """It keeps one hypothesis of a target."""
+        return False
+
+    def __call__(self, expected: Expected, measured: Measured, tracks: Array, plots: Array) -> Association:
+        """One hypothesis a track, a measurement serves one track at most. O(pairs) memory. See `AssociatePart`."""
+        n = len(tracks)
+        first, plot_first, plot = np.zeros(n + 1, np.int32), np.zeros(n + 1, np.int32), np.empty(n, np.int32)
+        room = PAIRS_PER_TRACK * n
+        while True:
+            pair, squared, cost = np.empty(room, np.int32), np.empty(room), np.empty(room)
+            pairs, taken = _associate(
+                expected.time, expected.mean, expected.covariance, expected.window, expected.extent, expected.penalty,
+                tracks, measured.time, measured.position, measured.noise, plots, self.gate, self.max_gate_m,
+                self.extent_sd, self.log_likelihood_ratio, first, pair, squared, cost, plot_first, plot,
+            )  # fmt: skip
+            if pairs <= room:
+                break
+            room = pairs
+        hypotheses = Hypotheses(np.arange(n + 1, dtype=np.int32), plot_first, plot[:taken], np.zeros(n))
+        return Association(hypotheses, first, pair[:pairs], cost[:pairs], squared[:pairs], NONE_ENDED)
 
 
 PART = GlobalNearestNeighbour
 
+NONE_ENDED = np.zeros(0, np.int32)
+
 CELLS_PER_GATE = 3
 """Cells of the search grid across half a gate: fewer compare pairs that are too far apart, more visit empty cells."""
 
-MOST_CELLS, MOST_CELLS_A_SIDE = 16384, 4096
-"""Of the search grid, so that one stray measurement does not make it large; 64 kB."""
+CELLS_PER_PLOT, LEAST_CELLS = 4, 64
+"""Of the search grid at most for each measurement, and for all, so that one stray measurement does not make it
+large."""
 
 
-def _grid(position: Floats, cell: float) -> tuple[Array, Array, Floats]:
-    """Measurements sorted into square cells: first row of each cell (CSR), the rows, (west, south, cell, nx, ny)."""
-    west, south = position.min(axis=0)
-    wide, high = position.max(axis=0) - (west, south)
-    cell = max(
-        cell,
-        math.sqrt(max(wide, 1.0) * max(high, 1.0) / MOST_CELLS),
-        wide / MOST_CELLS_A_SIDE,
-        high / MOST_CELLS_A_SIDE,
-    )
-    nx, ny = int(wide / cell) + 1, int(high / cell) + 1
-    start, order = np.zeros(nx * ny + 1, np.int32), np.empty(len(position), np.int32)
-    _sort_cells(position, west, south, cell, nx, start, order)
-    return start, order, np.array([west, south, cell, nx, ny], dtype=np.float64)
+PAIRS_PER_TRACK = 4
+"""Room for pairs at first; where more lie in the gates, it is asked for again."""
 
 
 @allocating
-def _sort_cells(position: Floats, west: float, south: float, cell: float, nx: int, start: Array, order: Array) -> None:
-    m = len(position)
-    where = np.empty(m, np.int32)
-    for j in range(m):
-        where[j] = int((position[j, 1] - south) / cell) * nx + int((position[j, 0] - west) / cell)
-        start[where[j] + 1] += 1
+def _associate(
+    time: Floats, mean: Floats, cov: Floats, window: Floats, extent: Floats, penalty: Floats, tracks: Array,
+    m_time: Floats, m_position: Floats, m_noise: Floats, plots: Array, gate: float, max_gate: float,
+    extent_sd: float, log_likelihood_ratio: float, first: Array, pair: Array, squared: Floats, cost: Floats,
+    plot_first: Array, taken: Array,
+) -> tuple[int, int]:  # fmt: skip
+    """Write the pairs and what is taken; how many of both. With more pairs than there is room for: only how many."""
+    n = len(tracks)
+    if n == 0 or len(plots) == 0:
+        return 0, 0
+    start, order, grid = _grid(m_position, plots, max_gate / CELLS_PER_GATE)
+    widest = 0.0
+    for j in plots:
+        widest = max(widest, m_noise[j, 0, 0] + m_noise[j, 1, 1])
+    k = 0
+    for a in range(n):
+        made = _gate_track(
+            tracks[a], time, mean, cov, window, extent, m_time, m_position, m_noise, gate, max_gate, extent_sd,
+            widest, start, order, grid, pair[k:], squared[k:], cost[k:],
+        )  # fmt: skip
+        for o in range(k, min(k + made, len(pair))):
+            cost[o] += penalty[tracks[a]] - log_likelihood_ratio
+        k += made
+        first[a + 1] = k
+    if k > len(pair):
+        return k, 0
+    where, column = np.empty(len(m_time), np.int32), np.empty(k, np.int32)
+    for o in range(len(plots)):
+        where[plots[o]] = o
+    for o in range(k):
+        column[o] = where[pair[o]]
+    chosen = np.empty(n, np.int32)
+    assign_sparse(first, column, cost[:k], len(plots), chosen)
+    count = 0
+    for a in range(n):
+        if chosen[a] >= 0:
+            taken[count] = plots[chosen[a]]
+            count += 1
+        plot_first[a + 1] = count
+    return k, count
+
+
+@allocating
+def _grid(position: Floats, plots: Array, cell: float) -> tuple[Array, Array, Floats]:
+    """Measurements sorted into square cells: first row of each cell, the rows, (west, south, cell, columns, rows)."""
+    m = len(plots)
+    west, east, south, north = np.inf, -np.inf, np.inf, -np.inf
+    for j in plots:
+        west, east = min(west, position[j, 0]), max(east, position[j, 0])
+        south, north = min(south, position[j, 1]), max(north, position[j, 1])
+    most = max(CELLS_PER_PLOT * m, LEAST_CELLS)
+    wide, high = max(east - west, 1.0), max(north - south, 1.0)
+    cell = max(cell, math.sqrt(wide * high / most), wide / most, high / most)
+    nx, ny = int(wide / cell) + 1, int(high / cell) + 1
+    start, order, where = np.zeros(nx * ny + 1, np.int32), np.empty(m, np.int32), np.empty(m, np.int32)
+    for o in range(m):
+        j = plots[o]
+        where[o] = int((position[j, 1] - south) / cell) * nx + int((position[j, 0] - west) / cell)
+        start[where[o] + 1] += 1
     for c in range(1, len(start)):
         start[c] += start[c - 1]
     filled = start.copy()
-    for j in range(m):
-        order[filled[where[j]]] = j
-        filled[where[j]] += 1
+    for o in range(m):
+        order[filled[where[o]]] = plots[o]
+        filled[where[o]] += 1
+    return start, order, np.array([west, south, cell, float(nx), float(ny)])
 
 
 @allocating
-def _gate(
-    time: Floats, state: Floats, cov: Floats, window: Floats, extent: Floats, m_time: Floats, m_position: Floats,
-    m_noise: Floats, gate: float, max_gate: float, extent_sd: float, start: Array, order: Array, grid: Floats,
-    first: Array, pair: Array, squared: Floats, log_det: Floats, fill: bool,
+def _gate_track(
+    i: int, time: Floats, mean: Floats, cov: Floats, window: Floats, extent: Floats, m_time: Floats,
+    m_position: Floats, m_noise: Floats, gate: float, max_gate: float, extent_sd: float, widest: float,
+    start: Array, order: Array, grid: Floats, pair: Array, squared: Floats, cost: Floats,
 ) -> int:  # fmt: skip
+    """The measurements in the gate of track i, with d^2 and d^2 + ln|S|, as far as there is room; how many."""
     west, south, cell, nx, ny = grid[0], grid[1], grid[2], int(grid[3]), int(grid[4])
-    widest = 0.0
-    for j in range(len(m_time)):
-        widest = max(widest, m_noise[j, 0, 0] + m_noise[j, 1, 1])
+    x, p = mean[i], cov[i]
+    along, across = (extent_sd * extent[i, 0]) ** 2, (extent_sd * extent[i, 1]) ** 2
+    se, ce = math.sin(extent[i, 2]), math.cos(extent[i, 2])
+    a00 = p[0, 0] + along * se * se + across * ce * ce
+    a01 = p[0, 1] + (along - across) * se * ce
+    a11 = p[1, 1] + along * ce * ce + across * se * se
+    reach = min(math.sqrt(gate * (a00 + a11 + widest)), max_gate)
+    reach += window[i] * math.sqrt(x[2] * x[2] + x[3] * x[3])
+    x_from, x_to = _span(x[0] - reach - west, x[0] + reach - west, cell, nx)
+    y_from, y_to = _span(x[1] - reach - south, x[1] + reach - south, cell, ny)
     k = 0
-    for i in range(len(time)):
-        x, p = state[i], cov[i]
-        along, across = (extent_sd * extent[i, 0]) ** 2, (extent_sd * extent[i, 1]) ** 2
-        se, ce = math.sin(extent[i, 2]), math.cos(extent[i, 2])
-        a00 = p[0, 0] + along * se * se + across * ce * ce
-        a01 = p[0, 1] + (along - across) * se * ce
-        a11 = p[1, 1] + along * ce * ce + across * se * se
-        reach = min(math.sqrt(gate * (a00 + a11 + widest)), max_gate)
-        reach += window[i] * math.sqrt(x[2] * x[2] + x[3] * x[3])
-        x_from, x_to = _span(x[0] - reach - west, x[0] + reach - west, cell, nx)
-        y_from, y_to = _span(x[1] - reach - south, x[1] + reach - south, cell, ny)
-        for cy in range(y_from, y_to):
-            for o in range(start[cy * nx + x_from], start[cy * nx + x_to] if x_to > x_from else 0):
-                j = order[o]
-                dt = m_time[j] - time[i]
-                if abs(dt) > window[i]:
-                    continue
-                v0 = m_position[j, 0] - x[0] - dt * x[2]
-                v1 = m_position[j, 1] - x[1] - dt * x[3]
-                if v0 * v0 + v1 * v1 > max_gate * max_gate:
-                    continue
-                s00, s01, s11 = a00 + m_noise[j, 0, 0], a01 + m_noise[j, 0, 1], a11 + m_noise[j, 1, 1]
-                det = s00 * s11 - s01 * s01
-                d2 = (v0 * v0 * s11 - 2.0 * v0 * v1 * s01 + v1 * v1 * s00) / det
-                if d2 <= gate:
-                    if fill:
-                        pair[k], squared[k], log_det[k] = j, d2, math.log(det)
-                    k += 1
-        first[i + 1] = k
+    for cy in range(y_from, y_to):
+        for o in range(start[cy * nx + x_from], start[cy * nx + x_to] if x_to > x_from else 0):
+            j = order[o]
+            dt = m_time[j] - time[i]
+            if abs(dt) > window[i]:
+                continue
+            v0 = m_position[j, 0] - x[0] - dt * x[2]
+            v1 = m_position[j, 1] - x[1] - dt * x[3]
+            if v0 * v0 + v1 * v1 > max_gate * max_gate:
+                continue
+            s00, s01, s11 = a00 + m_noise[j, 0, 0], a01 + m_noise[j, 0, 1], a11 + m_noise[j, 1, 1]
+            det = s00 * s11 - s01 * s01
+            d2 = (v0 * v0 * s11 - 2.0 * v0 * v1 * s01 + v1 * v1 * s00) / det
+            if d2 <= gate:
+                if k < len(pair):
+                    pair[k], squared[k], cost[k] = j, d2, d2 + math.log(det)
+                k += 1
     return k
 
 
@@ -159,11 +202,3 @@ def _span(low: float, high: float, cell: float, cells: int) -> tuple[int, int]:
     if high < 0.0 or low > cells * cell:
         return 0, 0
     return max(int(low / cell), 0) if low > 0.0 else 0, min(int(high / cell) + 1, cells)
-
-
-@allocating
-def _taken(first: Array, pair: Array, squared: Floats, chosen: NDArray[np.int32], distance: Floats) -> None:
-    for i in range(len(chosen)):
-        for k in range(first[i], first[i + 1]):
-            if pair[k] == chosen[i]:
-                distance[i] = squared[k]

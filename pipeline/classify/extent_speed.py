@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.kernels.compiled import allocating
 from pipeline.tables import TargetClass
 from pipeline.tables.arrays import Array
 
@@ -39,13 +41,36 @@ class ExtentSpeed:
         category: what each was held to be. claimed: TargetCategory of its reports, 0 when they say nothing.
         length, width: smoothed extent m, nan when unknown. speed: m/s. measurements: how many extents were seen.
         """
-        longest = np.fmax(length, width)
-        known = (measurements >= self.settle) & np.isfinite(longest)
-        made = category.astype(np.uint8, copy=True)
-        made[known & (longest <= self.vehicle_length) & (speed <= self.vehicle_speed)] = TargetClass.VEHICLE
-        made[known & (longest >= self.aircraft_length)] = TargetClass.AIRCRAFT
-        made[(speed >= self.aircraft_speed) & (measurements > 0)] = TargetClass.AIRCRAFT
-        return np.where(claimed > 0, claimed, made).astype(np.uint8)
+        made = np.empty(len(category), np.uint8)
+        _classify(
+            category, claimed, length, width, speed, measurements, self.aircraft_length, self.vehicle_length,
+            self.aircraft_speed, self.vehicle_speed, self.settle, made,
+        )  # fmt: skip
+        return made
 
 
 PART = ExtentSpeed
+
+AIRCRAFT, VEHICLE = int(TargetClass.AIRCRAFT), int(TargetClass.VEHICLE)
+
+
+@allocating
+def _classify(
+    category: Array, claimed: Array, length: Array, width: Array, speed: Array, measurements: Array,
+    aircraft_length: float, vehicle_length: float, aircraft_speed: float, vehicle_speed: float, settle: int,
+    made: Array,
+) -> None:  # fmt: skip
+    for k in range(len(made)):
+        made[k] = category[k]
+        longest = width[k] if math.isnan(length[k]) else length[k]
+        if not math.isnan(width[k]):
+            longest = max(longest, width[k])
+        if measurements[k] >= settle and math.isfinite(longest):
+            if longest >= aircraft_length:
+                made[k] = AIRCRAFT
+            elif longest <= vehicle_length and speed[k] <= vehicle_speed:
+                made[k] = VEHICLE
+        if measurements[k] > 0 and speed[k] >= aircraft_speed:
+            made[k] = AIRCRAFT
+        if claimed[k] > 0:
+            made[k] = claimed[k]

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from pipeline.contracts.associate import Expected
 from pipeline.kernels.compiled import allocating
 from pipeline.tables.arrays import Array, Floats
 
@@ -23,47 +20,36 @@ LONGEST_PLOT = 1.2
 less from turn to turn."""
 
 
-def enclosing_tracks(
-    tracks: Expected, established: Array, time: Floats, position: Floats, noise: Floats, extent: Floats, margin: float
-) -> Array:
-    """For each plot (m,) the track (n,) within whose extent it lies, nearest to its middle, or -1: (m,) int64.
-
-    tracks: moved along their velocity to the time of each plot. established: (n,) mask of tracks that may have plots.
-    time: s. position: (m, 2) m. noise: (m, 2, 2) m^2. extent: (m, 3) length m, width m, direction rad of the plots.
-    margin: m, that the extent is wider by at least; for long targets more where plot and track are less sure.
-    """
-    made = np.full(len(time), -1, np.int64)
-    if len(time) and established.any():
-        track_variance = np.trace(tracks.covariance[:, :2, :2], axis1=1, axis2=2)
-        variance = np.trace(noise, axis1=1, axis2=2)
-        _enclosing(
-            tracks.time, tracks.state, tracks.extent, track_variance, established, time, position, variance, extent,
-            margin, made,
-        )  # fmt: skip
-    return made
-
-
 @allocating
-def _enclosing(
-    track_time: Floats, state: Floats, track_extent: Floats, track_variance: Floats, established: Array, time: Floats,
-    position: Floats, variance: Floats, extent: Floats, least: float, made: Array,
-) -> None:  # fmt: skip
-    for j in range(len(time)):
-        best = 1.0
-        for i in range(len(track_time)):
-            if not established[i]:
-                continue
-            dt = time[j] - track_time[i]
-            e = position[j, 0] - state[i, 0] - dt * state[i, 2]
-            n = position[j, 1] - state[i, 1] - dt * state[i, 3]
-            length, width = track_extent[i, 0], track_extent[i, 1]
-            unsure = math.sqrt(MARGIN_VARIANCES * (track_variance[i] + variance[j]))
-            margin = min(max(least, unsure), least + MARGIN_EXTENT_SHARE * length)
-            a, b = 0.5 * length + margin, 0.5 * width + margin
-            if e * e + n * n > max(a, b) ** 2 or extent[j, 0] > LONGEST_PLOT * length + margin:
-                continue
-            s, c = math.sin(track_extent[i, 2]), math.cos(track_extent[i, 2])
-            along, across = e * s + n * c, e * c - n * s
-            ratio = (along / a) ** 2 + (across / b) ** 2
-            if ratio < best:
-                best, made[j] = ratio, i
+def enclosing_track(
+    tracks: Array, established: Array, track_time: Floats, mean: Floats, covariance: Floats, track_extent: Floats,
+    time: float, position: Floats, noise: Floats, length: float, least: float,
+) -> int:  # fmt: skip
+    """The place in `tracks` of the track within whose extent a plot lies, nearest to its middle, or -1.
+
+    tracks: (k,) rows of what follows. established: (n,) mask of tracks that may have plots. track_time: (n,) UTC s,
+    mean: (n, 4), covariance: (n, 4, 4), track_extent: (n, 3) length m, width m, direction rad; each is moved along its
+    velocity to the time of the plot. time: s. position: (2,) m. noise: (2, 2) m^2. length: m, of the plot. least: m,
+    that the extent is wider by at least; for long targets more where plot and track are less sure.
+    """
+    best, made = 1.0, -1
+    variance = noise[0, 0] + noise[1, 1]
+    for k in range(len(tracks)):
+        i = tracks[k]
+        if not established[i]:
+            continue
+        dt = time - track_time[i]
+        e = position[0] - mean[i, 0] - dt * mean[i, 2]
+        n = position[1] - mean[i, 1] - dt * mean[i, 3]
+        long, wide = track_extent[i, 0], track_extent[i, 1]
+        unsure = math.sqrt(MARGIN_VARIANCES * (covariance[i, 0, 0] + covariance[i, 1, 1] + variance))
+        margin = min(max(least, unsure), least + MARGIN_EXTENT_SHARE * long)
+        a, b = 0.5 * long + margin, 0.5 * wide + margin
+        if e * e + n * n > max(a, b) ** 2 or length > LONGEST_PLOT * long + margin:
+            continue
+        s, c = math.sin(track_extent[i, 2]), math.cos(track_extent[i, 2])
+        along, across = e * s + n * c, e * c - n * s
+        ratio = (along / a) ** 2 + (across / b) ** 2
+        if ratio < best:
+            best, made = ratio, k
+    return made

@@ -4,35 +4,35 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
+from pipeline.kernels.compiled import allocating
 from pipeline.tables.arrays import Array, Floats
 
 
+@allocating
 def join_split_plots(
-    member: Array, position: Floats, cells: Array, extent: Floats, direction: Floats
-) -> tuple[Floats, Floats]:
-    """Centre (k, 2) m and extent (k, 3) of k targets.
+    members: Array, position: Floats, cells: Array, extent: Floats, direction: float, centre: Floats, whole: Floats
+) -> None:
+    """Write the centre (2,) and the extent (3,) of one target that `members` (p,), rows of the plots, belong to.
 
-    member: (p,) the target of each plot; the first k plots are one of each target, in order. position: (p, 2) m.
-    cells: (p,) number of cells, by which the centre is weighed. extent: (p, 3) length m, width m and direction rad of
-    each plot, nan where unknown. direction: (k,) rad of the targets, along and across which their extent is measured
-    from end to end. A target of one plot keeps what that says.
+    position: (m, 2) m. cells: (m,) number of cells, by which the centre is weighed. extent: (m, 3) length m, width m
+    and direction rad of each plot, nan where unknown. direction: rad of the target, along and across which its extent
+    is measured from end to end.
     """
-    k = len(direction)
-    weight = np.maximum(cells, 1).astype(np.float64)
-    total = np.bincount(member, weight, k)
-    centre = np.stack([np.bincount(member, weight * position[:, axis], k) / total for axis in (0, 1)], axis=1)
-    split = np.bincount(member, minlength=k) > 1
-    made = extent[:k].copy()
-    turn = np.nan_to_num(extent[:, 2]) - direction[member]
-    for axis, (s, c) in enumerate(((np.sin(direction), np.cos(direction)), (np.cos(direction), -np.sin(direction)))):
-        along = position[:, 0] * s[member] + position[:, 1] * c[member]
-        lean = np.abs(np.cos(turn)) if axis == 0 else np.abs(np.sin(turn))
-        half = 0.5 * np.maximum(extent[:, 0] * lean, extent[:, 1] * np.sqrt(1 - lean**2))
-        low, high = np.full(k, np.inf), np.full(k, -np.inf)
-        np.minimum.at(low, member, along - half)
-        np.maximum.at(high, member, along + half)
-        made[split, axis] = (high - low)[split]
-    made[split, 2] = direction[split] % math.pi
-    return np.where(split[:, None], centre, position[:k]), made
+    s, c = math.sin(direction), math.cos(direction)
+    total = east = north = 0.0
+    ahead, behind, right, left = -math.inf, math.inf, -math.inf, math.inf
+    for j in members:
+        weight = float(max(cells[j], 1))
+        total += weight
+        east += weight * position[j, 0]
+        north += weight * position[j, 1]
+        along = position[j, 0] * s + position[j, 1] * c
+        across = position[j, 0] * c - position[j, 1] * s
+        turn = (extent[j, 2] if math.isfinite(extent[j, 2]) else 0.0) - direction
+        lean, cross = abs(math.cos(turn)), abs(math.sin(turn))
+        half_along = 0.5 * max(extent[j, 0] * lean, extent[j, 1] * cross)
+        half_across = 0.5 * max(extent[j, 0] * cross, extent[j, 1] * lean)
+        ahead, behind = max(ahead, along + half_along), min(behind, along - half_along)
+        right, left = max(right, across + half_across), min(left, across - half_across)
+    centre[0], centre[1] = east / total, north / total
+    whole[0], whole[1], whole[2] = ahead - behind, right - left, direction % math.pi

@@ -7,14 +7,18 @@ Layout, little endian, every part padded with zeros to a multiple of 8 octets:
     each column in the order of its declaration, C order; text as UTF-32
 
 The fingerprint is the CRC-32 of the declaration (name, dtype and row shape of every column), so that octets written for
-another declaration are refused and never read as something else.
+another declaration are refused and never read as something else, but for one case: octets written before a table got
+further columns, or before integer columns got wider, are read when each further column has a default, which it takes.
 """
 
 from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations, product
 from math import prod
 from typing import Any, TypeVar
 
@@ -36,11 +40,26 @@ ALIGNMENT = 8
 GREATEST_CODE_POINT = 0x10FFFF
 """Of Unicode; a UTF-32 unit above it is no text."""
 
+MOST_CHANGES = 4
+"""Columns added or widened since octets were written. The declaration is found by its fingerprint alone; of so many
+changes to the largest table there are some ten thousand, which take 0.1 s to try, once for each fingerprint."""
+
+KEPT_SEARCHES = 64
+"""Fingerprints of which the outcome of the search is remembered."""
+
 _HEAD = struct.Struct("<4sHHIIQ")
+
+
+class OtherFormError(ValueError):
+    """The octets were written for a declaration of tables or classes that this version of the program cannot read."""
 
 
 class CodecError(ValueError):
     """The octets are not the byte form of the table wanted; the message says what is wrong."""
+
+
+class OtherColumnsError(CodecError, OtherFormError):
+    """The octets belong to a table that this version does not know, or declares with other columns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +69,16 @@ class _Field:
     native: np.dtype[Any]
     shape: tuple[int, ...]
     row_bytes: int
+    default: Any
+    text: str
+    """What the fingerprint is made of."""
+
+    def narrower(self) -> list[_Field]:
+        """The same column with each integer type of the same sign that has fewer octets."""
+        kind, size = self.native.kind, self.native.itemsize
+        if kind not in "iu":
+            return []
+        return [_field(self.name, f"{kind}{octets}", self.shape, self.default) for octets in (1, 2, 4) if octets < size]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +87,7 @@ class _Layout:
     label: bytes
     fingerprint: int
     fields: tuple[_Field, ...]
+    """Those that are written; all of the kind unless it is an older layout."""
 
     def size(self, rows: int) -> int:
         """Octets of the whole byte form."""
@@ -86,16 +116,22 @@ def encode(table: Table) -> bytes:
 def decode(data: Octets, kind: type[T] | None = None, *, copy: bool = False) -> T:
     """The table of a byte form. kind: the table wanted; None: whichever the octets name.
 
+    Columns that were not yet written take their default, and integers that were written narrower become wider.
     copy: the columns are writable and own their octets; otherwise they are read-only views of `data` wherever the
-    alignment allows. Raises CodecError for everything that is not exactly the byte form of one such table.
+    alignment allows. Raises CodecError for everything that is not exactly the byte form of one such table, and of these
+    OtherColumnsError for tables and columns that this version does not declare.
     """
     name, fingerprint, columns, rows = _head(data)
     layout = _layout(kind) if kind is not None else _named(name)
     wanted = layout.label.decode()
     if name != wanted:
         raise CodecError(f"octets of the table {name!r}, {wanted} wanted")
-    if fingerprint != layout.fingerprint or columns != len(layout.fields):
-        raise CodecError(f"{name}: written with other columns than this version declares")
+    declared = layout.fields
+    if fingerprint != layout.fingerprint or columns != len(declared):
+        older = _older_layout(layout.kind, fingerprint, columns)  # type: ignore[arg-type]  # a class has a hash
+        if older is None:
+            raise OtherColumnsError(f"{name}: written with other columns than this version declares")
+        layout = older
     size = layout.size(rows)
     if len(data) != size:
         what = "cut off" if len(data) < size else "followed by more"
@@ -106,6 +142,8 @@ def decode(data: Octets, kind: type[T] | None = None, *, copy: bool = False) -> 
     for one in layout.fields:
         made[one.name] = _column(buffer, at, one, rows, name)
         at += _padded(one.row_bytes * rows)
+    if layout.fields is not declared:
+        made = {one.name: _as_declared(made.get(one.name), one, rows) for one in declared}
     return layout.kind._of_good(made)  # type: ignore[return-value]
 
 
@@ -186,22 +224,59 @@ def _column(buffer: Octets, at: int, one: _Field, rows: int, table: str) -> NDAr
 def _layout(kind: type[Table]) -> _Layout:
     known = _layouts.get(kind)
     if known is None:
-        fields = []
-        for name, column in kind.columns().items():
-            native = np.dtype(column.dtype)
-            fields.append(
-                _Field(name, native.newbyteorder("<"), native, column.shape, native.itemsize * prod(column.shape))
-            )
-        text = ";".join(f"{one.name} {one.stored.str} {list(one.shape)}" for one in fields)
+        fields = tuple(_field(name, one.dtype, one.shape, one.default) for name, one in kind.columns().items())
         label = kind.__name__.encode("ascii")
-        known = _layouts[kind] = _Layout(kind, label, zlib.crc32(text.encode()), tuple(fields))
+        known = _layouts[kind] = _Layout(kind, label, _fingerprint(fields), fields)
     return known
+
+
+def _field(name: str, dtype: str, shape: tuple[int, ...], default: Any) -> _Field:
+    native = np.dtype(dtype)
+    stored = native.newbyteorder("<")
+    text = f"{name} {stored.str} {list(shape)}"
+    return _Field(name, stored, native, shape, native.itemsize * prod(shape), default, text)
+
+
+def _fingerprint(fields: tuple[_Field, ...]) -> int:
+    return zlib.crc32(";".join([one.text for one in fields]).encode())
+
+
+@lru_cache(KEPT_SEARCHES)
+def _older_layout(kind: type[Table], fingerprint: int, columns: int) -> _Layout | None:
+    """The declaration that this fingerprint belonged to, before columns were added or widened; None when unknown."""
+    layout = _layout(kind)
+    added = len(layout.fields) - columns
+    if not 0 <= added <= MOST_CHANGES:
+        return None
+    optional = [place for place, one in enumerate(layout.fields) if one.default is not None]
+    for left_out in combinations(optional, added):
+        kept = tuple(one for place, one in enumerate(layout.fields) if place not in left_out)
+        for fields in _narrowed(kept, MOST_CHANGES - added):
+            if _fingerprint(fields) == fingerprint:
+                return _Layout(kind, layout.label, fingerprint, fields)
+    return None
+
+
+def _narrowed(fields: tuple[_Field, ...], most: int) -> Iterator[tuple[_Field, ...]]:
+    """The fields with up to `most` of them narrower, those with few changes first."""
+    choices = {place: narrower for place, one in enumerate(fields) if (narrower := one.narrower())}
+    for count in range(most + 1):
+        for places in combinations(choices, count):
+            for chosen in product(*(choices[place] for place in places)):
+                other = dict(zip(places, chosen, strict=True))
+                yield tuple(other.get(place, one) for place, one in enumerate(fields))
+
+
+def _as_declared(values: NDArray[Any] | None, one: _Field, rows: int) -> NDArray[Any]:
+    if values is None:
+        return np.full((rows, *one.shape), one.default, one.native)
+    return values.astype(one.native, copy=False)
 
 
 def _named(name: str) -> _Layout:
     kind = known_tables().get(name)
     if kind is None:
-        raise CodecError(f"octets of a table {name!r}, which this version does not know")
+        raise OtherColumnsError(f"octets of a table {name!r}, which this version does not know")
     return _layout(kind)
 
 

@@ -15,19 +15,24 @@ MARKS_A_TURN = 32
 """Marks in one turn of the antenna. What waits for the next mark waits for a 32nd of a turn at most: 31 ms at one turn
 a second, little beside the time the extractor needs to complete a plot. More marks cost more decisions a turn."""
 
+PLACES, PLACE = 8, 7
+"""A mark stands at the last of so many places of its 32nd of a turn, counted from 0: just before the end of the block
+where a radar delivers 32 a turn, so that it is decided with that block and not with the next."""
+
 
 def mark_row(mark: Numbers, azimuths: int) -> Numbers:
     """The absolute row (scan * azimuths + row) at which a mark stands.
 
     mark: absolute mark number (scan * MARKS_A_TURN + mark of the turn), or an int64 array of them. azimuths: rows a
-    turn; with fewer than MARKS_A_TURN several marks stand at the same row.
+    turn; with few rows several marks stand at the same row.
     """
-    return mark * azimuths // MARKS_A_TURN
+    return (PLACES * mark + PLACE) * azimuths // (PLACES * MARKS_A_TURN)
 
 
 def first_mark(row: int, azimuths: int) -> int:
     """The first mark that stands at or after an absolute row."""
-    return -(-row * MARKS_A_TURN // azimuths)
+    places = -(-row * PLACES * MARKS_A_TURN // azimuths)
+    return -(-(places - PLACE) // PLACES)
 
 
 def marks_between(low: int, high: int, azimuths: int) -> Array:

@@ -33,3 +33,6 @@ class TargetReports(Table):
     category: Array = column("u1", "", "TargetCategory", default=0)
     simulated: Array = column("?", "", "made by a simulator", default=False)
     arrival: Array = column("f8", "s", "UTC when it arrived at this host; nan when unknown", default=float("nan"))
+    source: Array = column(
+        "U16", "", "name of the sensor or feed that the report came through; empty when unknown", default=""
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -37,6 +37,7 @@ class FalsePlots:
 
     west, south: corner of the grid, m. rate: (rows, columns), multiplied by `scale`, which grows instead of all cells
     fading one by one. turns: how many were averaged so far. closed: absolute row up to which turns were counted.
+    coming: (k, 3) place in m and number of false plots, which count from the next turn on.
     """
 
     west: float
@@ -47,6 +48,7 @@ class FalsePlots:
     scale: float = 1.0
     turns: int = 0
     closed: int = 0
+    coming: Floats = field(default_factory=lambda: np.empty((0, 3)))
 
     @classmethod
     def around(cls, site: RadarSite, step: float = CELL_M, memory: float = MEMORY_TURNS) -> FalsePlots:
@@ -57,7 +59,12 @@ class FalsePlots:
         return cls(site.east - reach, site.north - reach, step, memory, np.zeros((cells, cells)))
 
     def turn(self, closed_to: int, azimuths: int) -> None:
-        """The antenna came to `closed_to`: at every whole turn the average moves on."""
+        """The antenna came to `closed_to`: what was learnt since the last turn counts; whole turns are averaged.
+
+        To be called at the same row of every turn.
+        """
+        _spread(self._cells(self.coming[:, :2]), self.coming[:, 2] * (self._gain * self.scale), self.rate)
+        self.coming = self.coming[:0]
         if closed_to < self.closed or self.turns == 0:
             self.closed = closed_to
             self.turns = max(self.turns, 1)
@@ -75,7 +82,7 @@ class FalsePlots:
 
     def learn(self, place: Floats, plots: Floats) -> None:
         """At these places (n, 2) there were so many false plots (n,)."""
-        _spread(self._cells(place), plots * (self._gain * self.scale), self.rate)
+        self.coming = np.concatenate([self.coming, np.column_stack([place, plots])])
 
     def density(self, place: Floats) -> Floats:
         """(n,) false plots a square metre and turn at places (n, 2), as far as learnt."""
@@ -104,12 +111,17 @@ def _spread(cell: Floats, amount: Floats, rate: Floats) -> None:
 
 @allocating
 def _read(cell: Floats, rate: Floats, out: Array) -> None:
-    rows, columns = rate.shape
     for k in range(len(cell)):
-        x, y = cell[k, 0], cell[k, 1]
-        if not (0.0 <= x < columns - 1 and 0.0 <= y < rows - 1):
-            continue
-        i, j = int(y), int(x)
-        v, u = y - i, x - j
-        low = rate[i, j] * (1 - u) + rate[i, j + 1] * u
-        out[k] = low * (1 - v) + (rate[i + 1, j] * (1 - u) + rate[i + 1, j + 1] * u) * v
+        out[k] = learnt_rate(rate, cell[k, 0], cell[k, 1])
+
+
+@allocating
+def learnt_rate(rate: Floats, x: float, y: float) -> float:
+    """The rate at a place, in cells from the middle of the first, between the middles of four cells; 0 outside."""
+    rows, columns = rate.shape
+    if not (0.0 <= x < columns - 1 and 0.0 <= y < rows - 1):
+        return 0.0
+    i, j = int(y), int(x)
+    v, u = y - i, x - j
+    low = rate[i, j] * (1 - u) + rate[i, j + 1] * u
+    return float(low * (1 - v) + (rate[i + 1, j] * (1 - u) + rate[i + 1, j + 1] * u) * v)

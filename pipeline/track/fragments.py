@@ -7,10 +7,15 @@ import math
 import numpy as np
 
 from pipeline.airport.model import SurfaceKind
-from pipeline.group.fragments import AIRCRAFT_HALF_EXTENT, FAST, Tracks, find_fragments, grow_extent
-from pipeline.tables import TargetClass, TrackPhase
-from pipeline.tables.arrays import Floats
-from pipeline.track.core import Core, end_tracks
+from pipeline.group.fragments import AIRCRAFT_HALF_EXTENT, FAST, LONGEST_AIRCRAFT, Tracks, find_fragments, grow_extent
+from pipeline.tables import TargetClass
+from pipeline.tables.arrays import Array, Floats
+from pipeline.track.branching import likeliest
+from pipeline.track.core import Core
+from pipeline.track.judge import end_tracks
+from pipeline.track.neighbours import close_rows
+from pipeline.track.shape import extents
+from pipeline.track.update import renew, restate
 
 MERGED_POSITION_SD = 0.1
 """Standard deviation of the middle of a joined target, as a fraction of the distance of its two fragments."""
@@ -24,49 +29,60 @@ EXTENT_COLUMNS = (
 )  # fmt: skip
 """What a track knows of the size and direction of its target."""
 
+IDENTITY_COLUMNS = (
+    "named", "address", "callsign", "claimed", "altitude", "on_ground", "simulated", "misfit_reports",
+)  # fmt: skip
+"""What reports say of a target besides its motion."""
 
-def join_fragments(core: Core) -> None:
+
+def join_fragments(core: Core, time: float) -> None:
     """Make one track, with the extent of all, of an aircraft and the tracks without an address that stay within its
     extent, and of tracks that stay close together off runways and taxiways without ever moving.
     """
-    table, n = core.table, core.table.n
-    table.least_half_extent[:n][table.moving[:n] & (table.category[:n] != TargetClass.AIRCRAFT)] = 0.0
-    alive = np.flatnonzero(table.phase[:n] != TrackPhase.TENTATIVE)
+    store = core.store
+    whole_again = core.column("moving") & (core.column("category") != TargetClass.AIRCRAFT)
+    core.column("least_half_extent")[whole_again] = 0.0
+    shown = likeliest(core, core.shown())
+    reach = 0.5 * LONGEST_AIRCRAFT + core.settings.grouping.absorb_margin
+    alive = close_rows(core, shown, time, reach)
+    if len(alive) < len(shown):
+        alone = np.ones(store.n, np.bool_)
+        alone[alive] = False
+        core.column("fragment_checks")[alone] = 0
     if len(alive) < 2:
         return
-    dt = core.time - table.time[alive]
-    state, covariance = core.filter.predict(table.state[alive], table.covariance[alive], dt)
-    named = table.address[alive] != ""
-    aircraft = table.category[alive] == TargetClass.AIRCRAFT
+    _, (state, covariance) = core.predicted(alive, np.full(len(alive), time))
+    records = store.records(alive)
+    named, aircraft = records["named"], records["category"] == TargetClass.AIRCRAFT
     kind = core.zones.kind(state[:, 0], state[:, 1])
     on_apron = (kind != SurfaceKind.RUNWAY) & (kind != SurfaceKind.TAXIWAY)
     tracks = Tracks(
         state=state,
         covariance=covariance,
-        extent=core.extents(alive),
-        longest_side=np.fmax(np.nan_to_num(table.length[alive]), np.nan_to_num(table.width[alive])),
+        extent=extents(records),
+        longest_side=np.fmax(np.nan_to_num(records["length"]), np.nan_to_num(records["width"])),
         named=named,
         aircraft=aircraft,
         on_apron=on_apron,
-        standing=on_apron & ~table.moved[alive] & ~named,
-        rank=RANK_NAMED * named + RANK_AIRCRAFT * aircraft + RANK_JOINED * (table.least_half_extent[alive] > 0),
+        standing=on_apron & ~records["moved"] & ~named,
+        rank=RANK_NAMED * named + RANK_AIRCRAFT * aircraft + RANK_JOINED * (records["least_half_extent"] > 0),
     )
     whole = find_fragments(tracks, core.settings.grouping.absorb_margin)
-    table.fragment_checks[alive] = np.where(whole >= 0, table.fragment_checks[alive] + 1, 0)
-    gone = np.zeros(n, np.bool_)
+    store.fragment_checks[alive] = np.where(whole >= 0, records["fragment_checks"] + 1, 0)
     fast = np.hypot(state[whole, 2], state[whole, 3]) > FAST
     patience = np.where(fast, 0, core.settings.grouping.merge_after)
-    for fragment in np.flatnonzero((whole >= 0) & (table.fragment_checks[alive] > patience)):
-        senior, junior = alive[whole[fragment]], alive[fragment]
-        if not gone[senior] and not gone[junior]:
+    gone: list[int] = []
+    for fragment in np.flatnonzero((whole >= 0) & (store.fragment_checks[alive] > patience)):
+        senior, junior = int(alive[whole[fragment]]), int(alive[fragment])
+        if senior not in gone and junior not in gone:
             parked = bool(on_apron[whole[fragment]] and not named[whole[fragment]])
-            _cover(core, int(senior), int(junior), state[fragment, :2] - state[whole[fragment], :2], parked)
-            least = table.least_half_extent[senior]
-            absorb(core, int(senior), int(junior))
-            table.least_half_extent[senior] = least
-            gone[junior] = True
-    core.count("fragments_joined", int(gone.sum()))
-    end_tracks(core, gone)
+            _cover(core, senior, junior, state[fragment, :2] - state[whole[fragment], :2], parked)
+            least = store.least_half_extent[senior]
+            absorb(core, senior, junior, keep_place=parked)
+            store.least_half_extent[senior] = least
+            gone.append(junior)
+    core.count("fragments_joined", len(gone))
+    end_tracks(core, np.array(gone, np.int64))
 
 
 def _cover(core: Core, whole: int, fragment: int, away: Floats, parked: bool) -> None:
@@ -74,46 +90,59 @@ def _cover(core: Core, whole: int, fragment: int, away: Floats, parked: bool) ->
 
     parked: its only motion was that from fragment to fragment, so it has no heading, and moves to the middle of both.
     """
-    table = core.table
+    store = core.store
     distance = float(np.hypot(away[0], away[1]))
-    own = core.extents(np.array([whole, fragment]))
-    direction = table.heading[whole]
+    own = extents(store.records(np.array([whole, fragment])))
+    direction = store.heading[whole]
     if not math.isfinite(direction):
         if distance > own[0, 0]:
-            table.axis_bearing[whole] = math.atan2(away[0], away[1]) % math.pi
-        direction = table.axis_bearing[whole] if math.isfinite(table.axis_bearing[whole]) else 0.0
+            store.axis_bearing[whole] = math.atan2(away[0], away[1]) % math.pi
+        direction = store.axis_bearing[whole] if math.isfinite(store.axis_bearing[whole]) else 0.0
     grown = grow_extent(own[0], own[1], away, direction)
     if parked:
-        table.state[whole, :2] += grown.shift * away
-        table.covariance[whole, 0, 0] += (MERGED_POSITION_SD * distance) ** 2
-        table.covariance[whole, 1, 1] += (MERGED_POSITION_SD * distance) ** 2
-        table.moved[whole] = table.moving[whole] = False
-        table.heading[whole] = np.nan
-        table.birthplace[whole] = table.state[whole, :2]
-    table.length[whole], table.width[whole] = grown.length, grown.width
-    table.least_half_extent[whole] = max(AIRCRAFT_HALF_EXTENT, 0.5 * max(grown.length, grown.width))
-    table.extent_count[whole] = max(int(table.extent_count[whole]), 1)
+        more = (MERGED_POSITION_SD * distance) ** 2 * np.eye(2)
+        restate(core, np.array([whole]), (grown.shift * away)[None], more[None])
+        store.moved[whole] = store.moving[whole] = False
+        store.heading[whole] = np.nan
+        store.birthplace[whole] = store.state[whole, :2]
+    store.length[whole], store.width[whole] = grown.length, grown.width
+    store.least_half_extent[whole] = max(AIRCRAFT_HALF_EXTENT, 0.5 * max(grown.length, grown.width))
+    store.extent_count[whole] = max(int(store.extent_count[whole]), 1)
 
 
-def absorb(core: Core, senior: int, junior: int) -> None:
-    """The track `senior` takes over from `junior` the better state, and address and extent where it has none."""
-    table = core.table
-    if np.trace(table.covariance[junior, :2, :2]) < np.trace(table.covariance[senior, :2, :2]) or (
-        table.radar_time[junior] > table.radar_time[senior]
-    ):
-        for name in ("time", "state", "covariance", "velocity_unknown"):
-            getattr(table, name)[senior] = getattr(table, name)[junior]
-        table.looked[:, senior] = table.looked[:, junior]
-    if table.extent_count[junior] > table.extent_count[senior]:
+def absorb(core: Core, senior: int, junior: int, keep_place: bool = False) -> None:
+    """The track `senior` takes over from `junior` the better state, and address and extent where it has none.
+
+    keep_place: not the state, for the middle of both is where the target is.
+    """
+    store = core.store
+    mine, other = store.rows[senior], store.rows[junior]
+    surer = np.trace(other["covariance"][:2, :2]) < np.trace(mine["covariance"][:2, :2])
+    if not keep_place and (surer or other["radar_time"] > mine["radar_time"]):
+        core.filter.merge(store, np.array([senior]), np.array([junior]), np.ones(1))
+        renew(core, np.array([senior]))
+        store.look[senior] = store.look[junior]
+    if other["extent_count"] > mine["extent_count"]:
         for name in EXTENT_COLUMNS:
-            getattr(table, name)[senior] = getattr(table, name)[junior]
-    if table.address[senior] == "" and table.address[junior] != "":
-        for name in ("address", "callsign", "claimed", "altitude", "on_ground", "simulated", "misfit_reports"):
-            getattr(table, name)[senior] = getattr(table, name)[junior]
-        if table.claimed[senior]:
-            table.category[senior] = table.claimed[senior]
+            mine[name] = other[name]
+    if other["named"] and not mine["named"]:
+        for name in IDENTITY_COLUMNS:
+            mine[name] = other[name]
+        if mine["claimed"]:
+            mine["category"] = mine["claimed"]
     for name in ("updated", "radar_time", "node_time", "report_time"):
-        getattr(table, name)[senior] = max(getattr(table, name)[senior], getattr(table, name)[junior])
-    table.hits[senior] += table.hits[junior]
-    table.misses[senior] = min(table.misses[senior], table.misses[junior])
-    table.moved[senior] |= table.moved[junior]
+        mine[name] = max(mine[name], other[name])
+    mine["hits"] += other["hits"]
+    mine["moved"] |= other["moved"]
+    store.evidence[senior] = _joined(store.evidence[senior], store.evidence[junior])
+
+
+def _joined(mine: Array, other: Array) -> Array:
+    """The evidence of two tracks of one target: of each sensor, that of the track which it favours more."""
+    made = mine.copy()
+    better = other["score"] > mine["score"]
+    made[better] = other[better]
+    made["history"] = mine["history"] | other["history"]
+    made["looks"] = np.maximum(mine["looks"], other["looks"])
+    made["misses"] = np.minimum(mine["misses"], other["misses"])
+    return made

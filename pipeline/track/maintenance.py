@@ -4,24 +4,34 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.contracts.associate import Expected
+from pipeline.group.enclosing import enclosing_track
 from pipeline.kernels.compiled import allocating
 from pipeline.tables import TargetCategory, TargetClass, TrackPhase
 from pipeline.tables.arrays import Array, Floats
-from pipeline.track.core import Core, clear_identity, end_tracks, update_lifecycle
+from pipeline.track.branching import likeliest
+from pipeline.track.core import Core, clear_identity
 from pipeline.track.fragments import absorb, join_fragments
-from pipeline.track.radar_update import owners
-from pipeline.track.table import NEVER
+from pipeline.track.judge import end_tracks, judge_tracks
+from pipeline.track.latency import with_latency
+from pipeline.track.neighbours import close_rows
+from pipeline.track.shape import SETTLED, extents, fill_track_extent
+from pipeline.track.store import NEVER
 
-LIFECYCLE_INTERVAL_S = 0.12
-"""Between two decisions of the lifecycle part on all tracks, so that not each of 32 sectors a turn makes one. Tied to a
-one-second antenna: a turn has eight."""
+JUDGE_INTERVAL_S = 0.5
+"""Between two times at which all tracks are judged, whether looked at or not: a fifth of the shortest silence that
+changes something."""
 
 MAINTENANCE_INTERVAL_S = 1.0
-"""Between two searches for duplicates and fragments. Tied to a one-second antenna: a check per turn."""
+"""Between two searches for duplicates and fragments. What must be found in several checks has then lasted seconds,
+whatever the antennas do."""
 
-DUPLICATE_DISTANCE_M = 60.0
-"""In east and in north, beyond which two tracks are not compared: the size of a large aircraft."""
+DUPLICATE_DISTANCE_M = 150.0
+"""In east and in north, beyond which two tracks are not compared: the size of a large aircraft, and what it moves by in
+a second on the final approach, by which its reports may be late."""
+
+FARTHEST_INSIDE_M = 250.0
+"""East or west of the middle of a track, nothing lies within its extent: the longest echo is 200 m, and both have moved
+since they were seen."""
 
 DUPLICATE_GATE = 6.0
 """Squared Mahalanobis distance of the positions, up to which two tracks may be one target: 95 % in two dimensions."""
@@ -37,84 +47,168 @@ the 90 % bound of two dimensions (4.6)."""
 VELOCITY_VARIANCE = 1.0
 """m^2/s^2 beyond what the filter states, for its constant velocity is not the truth."""
 
+FAST_ALIKE = 8.0
+"""m/s, above which two targets do not pass within each other's gate for some seconds with the same velocity."""
+
+SEEN_APART_S = 5.0
+"""Two tracks that a radar saw at the same time for so long are two targets, although it sees one of them no more."""
+
 VEHICLE, AIRCRAFT = 1, 2
 """Marks of a track reported as a vehicle, and of another one classified as an aircraft; 0 for all others."""
 
 
-def maintain_tracks(core: Core) -> None:
-    """End and coast tracks, clear addresses no longer reported, merge tracks of one target, at the tracker's time."""
-    if abs(core.time - core.lifecycle_time) < LIFECYCLE_INTERVAL_S:
+def next_housekeeping(core: Core) -> float:
+    """UTC s from which the tracks are to be looked after."""
+    return core.judged_time + JUDGE_INTERVAL_S
+
+
+def keep_house(core: Core, time: float) -> None:
+    """End and coast tracks, clear addresses no longer reported, merge tracks of one target, at `time` UTC s."""
+    core.judged_time = time
+    rows = core.alive()
+    judge_tracks(core, rows, np.full(len(rows), time))
+    if abs(time - core.maintenance_time) < MAINTENANCE_INTERVAL_S:
         return
-    core.lifecycle_time = core.time
-    update_lifecycle(core)
-    if abs(core.time - core.maintenance_time) < MAINTENANCE_INTERVAL_S:
-        return
-    core.maintenance_time = core.time
-    unheard = core.column("report_time") < core.time - core.settings.identity.forget_after
-    stale = np.flatnonzero((core.column("address") != "") & unheard)
+    core.maintenance_time = time
+    unheard = core.column("report_time") < time - core.settings.identity.forget_after
+    stale = np.flatnonzero(core.column("named") & unheard)
     core.count("identity_stale", len(stale))
     clear_identity(core, stale)
-    _merge_duplicates(core)
-    join_fragments(core)
+    _merge_duplicates(core, time)
+    join_fragments(core, time)
     _end_fragments(core)
+    core.store.clear_ended()
 
 
-def _merge_duplicates(core: Core) -> None:
+def _merge_duplicates(core: Core, time: float) -> None:
     """Where two tracks stay together and one of them gets no plots, the older goes on with what both know."""
-    table, n = core.table, core.table.n
-    alive = np.flatnonzero(table.phase[:n] != TrackPhase.TENTATIVE)
+    store = core.store
+    shown = likeliest(core, core.shown())
+    alive = close_rows(core, shown, time, DUPLICATE_DISTANCE_M, _starved(core, shown, time))
+    if len(alive) < len(shown):
+        _reset(store.rows, shown, alive)
     if len(alive) < 2:
         return
-    dt = core.time - table.time[alive]
-    state, covariance = core.filter.predict(table.state[alive], table.covariance[alive], dt)
+    _, (state, covariance) = core.predicted(alive, np.full(len(alive), time))
+    records = store.records(alive)
+    covariance = with_latency(state, covariance, core.unsure_latency(alive, np.full(len(alive), time)))
     order = np.argsort(state[:, 0], kind="stable")
-    name = np.unique(table.address[alive], return_inverse=True)[1]
-    name[table.address[alive] == ""] = -1
-    starved = table.radar_time[alive] < core.time - core.settings.grouping.starved_after
-    original = np.full(len(alive), -1, np.int64)
+    named = records["named"]
+    name = np.full(len(alive), -1, np.int64)
+    name[named] = np.unique(records["address"][named], return_inverse=True)[1]
     # Never merge a reported vehicle with a track classified as an aircraft.
     kind = np.zeros(len(alive), np.int8)
-    kind[table.claimed[alive] == TargetCategory.VEHICLE] = VEHICLE
-    kind[(kind == 0) & (table.category[alive] == TargetClass.AIRCRAFT)] = AIRCRAFT
-    _duplicates(order, state, covariance, core.extents(alive), name, kind, starved, table.born[alive], original)
-    table.duplicate_checks[alive] = np.where(original >= 0, table.duplicate_checks[alive] + 1, 0)
-    gone = np.zeros(n, np.bool_)
-    for junior in np.flatnonzero(table.duplicate_checks[alive] >= core.settings.grouping.merge_after):
+    kind[records["claimed"] == TargetCategory.VEHICLE] = VEHICLE
+    kind[(kind == 0) & (records["category"] == TargetClass.AIRCRAFT)] = AIRCRAFT
+    original = np.full(len(alive), -1, np.int64)
+    seen = np.stack([records["born"], records["plot_since"], records["radar_time"]], axis=1)
+    _duplicates(
+        order, state, covariance, extents(records), name, kind, _starved(core, alive, time), named, seen, original
+    )
+    store.duplicate_checks[alive] = np.where(original >= 0, records["duplicate_checks"] + 1, 0)
+    gone: list[int] = []
+    for junior in np.flatnonzero(store.duplicate_checks[alive] >= _checks_wanted(core, records, state, original)):
         senior = alive[original[junior]]
-        if not gone[senior]:
+        if senior not in gone:
             absorb(core, int(senior), int(alive[junior]))
-            gone[alive[junior]] = True
-    core.count("merged", int(gone.sum()))
-    end_tracks(core, gone)
+            gone.append(int(alive[junior]))
+    core.count("merged", len(gone))
+    end_tracks(core, np.array(gone, np.int64))
+
+
+def _checks_wanted(core: Core, records: Array, state: Floats, original: Array) -> Array:
+    """(n,) checks in a row after which a track becomes one with its `original`.
+
+    One that is reported and one that is not may be a vehicle and what it drives past: only time tells them apart,
+    unless both move fast and alike.
+    """
+    fast = np.hypot(state[:, 2], state[:, 3]) > FAST_ALIKE
+    passing = (records["named"] != records["named"][original]) & ~(fast & fast[original])
+    return np.where(passing, core.settings.grouping.merge_named_after, core.settings.grouping.merge_after)
+
+
+def _starved(core: Core, rows: Array, time: float) -> Array:
+    """Mask of the tracks that no radar has contributed to for some turns."""
+    store, made = core.store, np.empty(len(rows), np.bool_)
+    period = np.array([one.period for one in core.clocks])
+    _find_starved(store.rows, store.evidence, rows, period, time, core.settings.grouping.starved_turns, made)
+    return made
+
+
+@allocating
+def _find_starved(
+    tracks: Array, evidence: Array, rows: Array, period: Floats, time: float, turns: float, made: Array
+) -> None:
+    for k in range(len(rows)):
+        fastest, slowest = np.inf, 0.0
+        for s in range(len(period)):
+            slowest = max(slowest, period[s])
+            if evidence[rows[k], s]["history"] != 0:
+                fastest = min(fastest, period[s])
+        if fastest == np.inf:
+            fastest = slowest if slowest > 0.0 else 1.0
+        made[k] = tracks[rows[k]]["radar_time"] < time - turns * fastest
 
 
 def _end_fragments(core: Core) -> None:
     """End tentative tracks by radar alone inside the extent of an established track: they are fragments of its echo."""
-    table, n = core.table, core.table.n
-    young = np.flatnonzero((table.phase[:n] == TrackPhase.TENTATIVE) & (table.extent_count[:n] > 0))
-    young = young[np.maximum(table.node_time[young], table.report_time[young]) == NEVER]
-    old = np.flatnonzero(table.phase[:n] == TrackPhase.CONFIRMED)
+    store = core.store
+    phase, count = core.column("phase"), core.column("extent_count")
+    alone = np.maximum(core.column("node_time"), core.column("report_time")) == NEVER
+    young = np.flatnonzero((phase == TrackPhase.TENTATIVE) & (count > 0) & alone)
+    old = np.flatnonzero((phase == TrackPhase.CONFIRMED) & (count >= SETTLED))
     if not len(young) or not len(old):
         return
-    size = core.extents()
-    known = Expected(
-        table.time[old], table.state[old], table.covariance[old], np.zeros(len(old)), size[old], np.zeros(len(old))
+    old = old[np.argsort(store.state[old, 0], kind="stable")]
+    inside = np.zeros(len(young), np.bool_)
+    _inside(
+        store.rows, store.time, store.state, store.covariance, old, young, core.settings.grouping.absorb_margin, inside
     )
-    owner = owners(
-        core, old, known, table.time[young], table.state[young, :2], table.covariance[young, :2, :2], size[young]
-    )
-    gone = np.zeros(n, np.bool_)
-    gone[young[owner >= 0]] = True
-    core.count("absorbed_tracks", int(gone.sum()))
-    end_tracks(core, gone)
+    core.count("absorbed_tracks", int(inside.sum()))
+    end_tracks(core, young[inside])
+
+
+@allocating
+def _reset(tracks: Array, rows: Array, but: Array) -> None:
+    """Tracks without a neighbour duplicate none."""
+    k = 0
+    for i in rows:
+        if k < len(but) and but[k] == i:
+            k += 1
+        else:
+            tracks[i]["duplicate_checks"] = 0
+
+
+@allocating
+def _inside(
+    tracks: Array, time: Floats, state: Floats, covariance: Floats, old: Array, young: Array, margin: float,
+    inside: Array,
+) -> None:  # fmt: skip
+    """Which of `young` lie in the extent of one of `old`, which are sorted by east."""
+    n = len(tracks)
+    established, extent, own = np.ones(n, np.bool_), np.empty((n, 3)), np.empty(3)
+    east = np.empty(len(old))
+    for k in range(len(old)):
+        fill_track_extent(tracks[old[k]], extent[old[k]])
+        east[k] = state[old[k], 0]
+    for k in range(len(young)):
+        i = young[k]
+        fill_track_extent(tracks[i], own)
+        first = np.searchsorted(east, state[i, 0] - FARTHEST_INSIDE_M)
+        last = np.searchsorted(east, state[i, 0] + FARTHEST_INSIDE_M)
+        inside[k] = enclosing_track(
+            old[first:last], established, time, state, covariance, extent, time[i], state[i, :2],
+            covariance[i, :2, :2], own[0], margin,
+        ) >= 0  # fmt: skip
 
 
 @allocating
 def _duplicates(
-    order: Array, state: Floats, cov: Floats, extent: Floats, name: Array, kind: Array, starved: Array, born: Floats,
-    original: Array,
+    order: Array, state: Floats, cov: Floats, extent: Floats, name: Array, kind: Array, starved: Array, named: Array,
+    seen: Floats, original: Array,
 ) -> None:  # fmt: skip
-    """For each track the older one that it duplicates, or -1. order: rows by east."""
+    """For each track the older one that it duplicates, or -1. order: rows by east. seen: (n, 3) UTC s from when a track
+    is known, of its first and of its last plot."""
     for a in range(len(order)):
         i = order[a]
         for b in range(a + 1, len(order)):
@@ -128,6 +222,9 @@ def _duplicates(
                 continue
             if kind[i] != kind[j] and kind[i] + kind[j] == VEHICLE + AIRCRAFT:
                 continue
+            together = min(seen[i, 2], seen[j, 2]) - max(seen[i, 1], seen[j, 1])
+            if named[i] != named[j] and together > SEEN_APART_S:
+                continue
             wide = (DUPLICATE_EXTENT_SD * max(extent[i, 0], extent[j, 0])) ** 2
             s00 = cov[i, 0, 0] + cov[j, 0, 0] + wide
             s11 = cov[i, 1, 1] + cov[j, 1, 1] + wide
@@ -137,6 +234,6 @@ def _duplicates(
             variance = cov[i, 2, 2] + cov[i, 3, 3] + cov[j, 2, 2] + cov[j, 3, 3]
             if squared > DUPLICATE_GATE or difference > VELOCITY_GATE * (variance + VELOCITY_VARIANCE):
                 continue
-            older, younger = (i, j) if (born[i], i) <= (born[j], j) else (j, i)
+            older, younger = (i, j) if (seen[i, 0], i) <= (seen[j, 0], j) else (j, i)
             if original[younger] < 0:
                 original[younger] = older

@@ -6,9 +6,15 @@ import math
 
 import numpy as np
 
+from pipeline.contracts.filter import Prior
+from pipeline.contracts.measured import Hypotheses, Measured
 from pipeline.tables import NodeEventKind, NodeEvents, Source, TrackPhase
-from pipeline.tables.arrays import Floats
-from pipeline.track.core import Core, apply_positions, start_tracks, update_lifecycle
+from pipeline.tables.arrays import Array, Floats
+from pipeline.track.branching import likeliest
+from pipeline.track.core import Core
+from pipeline.track.judge import judge_tracks
+from pipeline.track.shape import extents
+from pipeline.track.update import add_score, node_sensor, start_tracks, unknown_velocity, update_tracks
 
 LEAST_SPEED = 0.5
 """m/s, below which the sense of a motion along the lane is not believed."""
@@ -52,40 +58,46 @@ def take_node_events(core: Core, events: NodeEvents) -> NodeEvents:
     for event in np.argsort(events.time, kind="stable"):
         _apply_event(core, events, int(event))
         core.time = max(core.time, float(events.time[event]))
-    update_lifecycle(core)
+    rows = core.alive()
+    judge_tracks(core, rows, np.full(len(rows), core.time))
     return events
 
 
 def _apply_event(core: Core, events: NodeEvents, event: int) -> None:
     site, time = core.nodes[int(events.node[event])], float(events.time[event])
-    table, n = core.table, core.table.n
+    store, rows = core.store, likeliest(core, core.alive())
     lane = np.array([math.sin(site.heading), math.cos(site.heading)])
-    dt = time - table.time[:n]
-    state, covariance = core.filter.predict(table.state[:n], table.covariance[:n], dt)
-    position, noise = _as_measured(core, site.accuracy, lane, state, events.kind[event], (site.east, site.north))
+    _, (state, covariance) = core.predicted(rows, np.full(len(rows), time))
+    size = extents(store.records(rows))
+    position, noise = _as_measured(
+        core, site.accuracy, lane, state, size, int(events.kind[event]), (site.east, site.north)
+    )
     spread = covariance[:, :2, :2] + noise
     off = position - state[:, :2]
     distance = _squared(off, spread)
     close = (distance <= core.associate.gate) & (
         np.hypot(off[:, 0], off[:, 1]) <= GATE_SHARE * core.associate.max_gate_m
     )
-    cost = distance + np.log(np.linalg.det(spread)) if n else distance
-    cost = cost + np.where(table.phase[:n] == TrackPhase.TENTATIVE, core.settings.measurement.tentative_penalty, 0.0)
+    cost = distance + np.log(np.linalg.det(spread)) if len(rows) else distance
+    cost = cost + np.where(store.phase[rows] == TrackPhase.TENTATIVE, core.settings.measurement.tentative_penalty, 0.0)
     if close.any():
         best = int(np.argmin(np.where(close, cost, np.inf)))
-        _update_track(core, best, time, position[best], noise[best])
+        measured = Measured.of(
+            np.array([time]), position[best][None], noise[best][None], speed=events.speed[event],
+            sensor=node_sensor(core),
+        )  # fmt: skip
+        _update_track(core, rows[best : best + 1], measured)
         return
     _start(core, events, event, time, lane)
 
 
 def _as_measured(
-    core: Core, accuracy: float, lane: Floats, state: Floats, kind: int, at: tuple[float, float]
+    core: Core, accuracy: float, lane: Floats, state: Floats, size: Floats, kind: int, at: tuple[float, float]
 ) -> tuple[Floats, Floats]:
     """Where the centre of each track would be if it caused the event, and how surely: (n, 2) and (n, 2, 2).
 
     ARRIVED is felt when the front reaches the node, LEFT when the tail leaves it.
     """
-    size = core.extents()
     sense = state[:, 2] * lane[0] + state[:, 3] * lane[1]
     offset = {NodeEventKind.ARRIVED: -FRONT, NodeEventKind.LEFT: FRONT}.get(NodeEventKind(min(int(kind), 2)), 0.0)
     shift = np.where(np.abs(sense) > LEAST_SPEED, np.sign(sense), 0.0) * offset * size[:, 0]
@@ -94,7 +106,7 @@ def _as_measured(
     along = accuracy**2 + (EXTENT_SD_ALONG * size[:, 0]) ** 2 + np.where(shift == 0, unknown_end, 0.0)
     across = core.settings.measurement.lane_sd**2 + (EXTENT_SD_ACROSS * size[:, 1]) ** 2
     noise = along[:, None, None] * np.outer(lane, lane)
-    side = np.array([lane[1], -lane[0]])
+    side = _side(lane)
     return position, np.asarray(noise + across[:, None, None] * np.outer(side, side))
 
 
@@ -108,35 +120,47 @@ def _squared(off: Floats, spread: Floats) -> Floats:
     return np.asarray(top / det)
 
 
-def _update_track(core: Core, row: int, time: float, position: Floats, noise: Floats) -> None:
-    table = core.table
-    tentative = table.phase[row] == TrackPhase.TENTATIVE
-    rows = np.array([row])
-    apply_positions(core, rows, np.array([time]), position[None], noise[None], Source.NODE)
+def _update_track(core: Core, rows: Array, measured: Measured) -> None:
+    store, sensor = core.store, node_sensor(core)
+    if core.associate.branching:
+        rows = core.alive()[store.target[core.alive()] == store.target[rows[0]]]
+    tentative = rows[store.phase[rows] == TrackPhase.TENTATIVE]
+    predicted, _ = core.predicted(rows, np.full(len(rows), measured.time[0]))
+    update_tracks(core, predicted, measured, Hypotheses.single(np.zeros(len(rows), np.int32)), sensor, Source.NODE)
+    add_score(core, rows, sensor, core.settings.evidence.other_sensor)
     core.count("node_pulled")
-    if tentative:
+    if len(tentative):
         # two kinds of sensor agree on a place and a time, which confirms it at once
-        table.history[row] = ALL_HITS
-        table.looks[row] = max(int(table.looks[row]), HISTORY_LOOKS)
-        table.score[row] = core.settings.evidence.max_score
+        evidence = store.evidence[:, sensor]
+        evidence["history"][tentative] = ALL_HITS
+        evidence["looks"][tentative] = np.maximum(evidence["looks"][tentative], HISTORY_LOOKS)
+        evidence["score"][tentative] = core.settings.evidence.max_score
         core.count("node_confirmed")
 
 
 def _start(core: Core, events: NodeEvents, event: int, time: float, lane: Floats) -> None:
-    site, table = core.nodes[int(events.node[event])], core.table
+    site = core.nodes[int(events.node[event])]
     speed = float(events.speed[event])
     knows_speed = math.isfinite(speed) and 0 <= speed < MOST_SPEED
-    side = np.array([lane[1], -lane[0]])
-    noise = site.accuracy**2 * np.outer(lane, lane) + core.settings.measurement.lane_sd**2 * np.outer(side, side)
-    position = np.array([[site.east, site.north]])
-    made = start_tracks(
-        core, np.array([time]), position, noise[None], Source.NODE, bool(events.simulated[event]) or site.simulated,
+    across = np.outer(_side(lane), _side(lane))
+    noise = site.accuracy**2 * np.outer(lane, lane) + core.settings.measurement.lane_sd**2 * across
+    prior = unknown_velocity(core, 1)
+    if knows_speed:
+        along_sd, across_sd = SPEED_SD + speed, SPEED_SD + SPEED_SD_ACROSS * speed
+        prior = Prior(
+            prior.velocity, (along_sd**2 * np.outer(lane, lane) + across_sd**2 * across)[None], np.ones(1, np.bool_)
+        )
+    measured = Measured.of(
+        np.array([time]), np.array([[site.east, site.north]]), noise[None], speed=speed, sensor=node_sensor(core)
+    )
+    rows = start_tracks(
+        core, measured, prior, node_sensor(core), Source.NODE, bool(events.simulated[event]) or site.simulated,
         head_start=KNOWN_SPEED_HEAD_START if knows_speed else 0,
     )  # fmt: skip
-    core.count("node_started", made.stop - made.start)
-    core.count("node_without_track", int(made.stop == made.start))
-    if knows_speed and made.stop > made.start:
-        row = made.start
-        along, across = (SPEED_SD + speed) ** 2, (SPEED_SD + SPEED_SD_ACROSS * speed) ** 2
-        table.covariance[row, 2:, 2:] = along * np.outer(lane, lane) + across * np.outer(side, side)
-        table.velocity_unknown[row] = False
+    core.count("node_started", len(rows))
+    core.count("node_without_track", int(not len(rows)))
+
+
+def _side(lane: Floats) -> Floats:
+    """The direction across a lane."""
+    return np.array([lane[1], -lane[0]])

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.tables.arrays import Array
-from pipeline.track.table import NEVER
+from pipeline.track.store import NEVER
 
 LAST_ASTERIX_NUMBER = 4095
 """The greatest track number of ASTERIX CAT010: I010/161 has 12 bits for it."""

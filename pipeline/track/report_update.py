@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.contracts.associate import Assignment, Expected, Measured
-from pipeline.tables import Source, TargetCategory, TargetReports, TrackPhase
+from pipeline.contracts.associate import Association
+from pipeline.contracts.measured import Hypotheses, Measured
+from pipeline.tables import Source, TargetCategory, TargetReports
 from pipeline.tables.arrays import Array, Floats
-from pipeline.track.core import Core, apply_positions, clear_identity, start_tracks, update_lifecycle
-from pipeline.track.table import NEVER
+from pipeline.track.branching import likeliest
+from pipeline.track.core import Core, clear_identity
+from pipeline.track.judge import judge_tracks
+from pipeline.track.latency import CORROBORATED_S, latency_noise, lateness, source_keys, with_latency
+from pipeline.track.schedule import forget_plans
+from pipeline.track.shape import extents
+from pipeline.track.stated_velocity import stated_velocity
+from pipeline.track.store import NEVER
+from pipeline.track.update import add_score, renew, report_sensor, start_tracks, unknown_velocity, update_tracks
 
 WORST_ACCURACY = 1000.0
 """m; a report of a worse standard deviation is no position on an airport."""
@@ -18,31 +26,38 @@ ANTENNA_SD = 0.3
 is decided whether a report fits its track. Larger than `report_centroid_sd`, which weighs the update: to refuse a
 true report costs more than to take one that is off."""
 
+YOUNG_GATE = 9.0
+"""Squared Mahalanobis distance up to which a second report agrees with the velocity that the first stated; 99 %
+in two dimensions."""
+
+PART_GATE = 12.0
+"""Square of how many standard deviations a report may lie from where the radar has just seen its target: 3.5, which
+one report in 400 exceeds by chance; three in a row do not."""
+
+PART_SD = 0.15
+"""Standard deviation of the antenna from the centre of a plot, as a fraction of the length; of what is seen, half of
+what may be wrong with a track (ANTENNA_SD)."""
+
+PART_TIME_SD = 0.3
+"""s, by which a track's velocity is not that of the time between a plot and a report: it brakes and turns."""
+
 WINDOW_LAGS = 2.0
 """Longest allowed lags by which a report's time may differ from that at which tracks are expected."""
 
 ADDRESS_HEAD_START = 2
 """Looks that count as hits beforehand of a track begun by a report with an address: only a transponder sends one."""
 
-STANDING_SPEED = 1.0
-"""m/s, below which a report without a course still has a velocity: nearly none."""
-
-MOST_SPEED = 300.0
-"""m/s, above which a reported speed is not believed; nothing flies faster near an airport."""
-
-SPEED_SD, SPEED_SD_SHARE = 2.0, 0.05
-"""m/s and fraction of the speed: standard deviation of each component of a reported velocity; ADS-B of NACv 2 states
-3 m/s with 95 %, and the course is rounded."""
-
 
 def take_target_reports(core: Core, reports: TargetReports) -> int:
     """Take reports in order of time; those of one address one after the other. How many were in time and in reach."""
     reports = _usable(core, reports)
+    core.reports_taken += len(reports)
     reports = reports[np.argsort(reports.time, kind="stable")]
     turn = _occurrence(reports.address)
     for number in range(int(turn.max()) + 1 if len(turn) else 0):
         _take_round(core, reports[turn == number])
-    update_lifecycle(core)
+    rows = core.alive()
+    judge_tracks(core, rows, np.full(len(rows), core.time))
     return len(reports)
 
 
@@ -75,12 +90,15 @@ def _take_round(core: Core, reports: TargetReports) -> None:
     core.time = max(core.time, float(reports.time.max()))
     row = _known(core, reports)
     old = row >= 0
-    late = old & (reports.time < core.column("time")[row] - core.settings.timing.max_lag) if core.table.n else old
+    late = old & (reports.time < core.store.time[row] - core.settings.timing.max_lag)
     core.count("report_late", int(late.sum()))
     reports, row = reports[~late], row[~late]
-    fits = _fits(core, reports, row)
+    fits = _fits(core, reports, row, YOUNG_GATE)
+    opened = _open_young(core, row, fits)
+    fits[opened] = _fits(core, reports[opened], row[opened], core.settings.identity.gate)
     _apply(core, reports[fits], row[fits])
     lost = np.flatnonzero((row >= 0) & ~fits)
+    lost = lost[~_begin_anew(core, reports[lost], row[lost])]
     moved = _reject(core, row[lost])
     named = (reports.address != "") & (row < 0)
     named[lost[moved]] = True
@@ -90,47 +108,109 @@ def _take_round(core: Core, reports: TargetReports) -> None:
 
 def _known(core: Core, reports: TargetReports) -> Array:
     """The row of the track that bears each report's address, or -1."""
-    ours = core.column("address")
-    order = np.argsort(ours, kind="stable")
-    if not len(ours):
+    rows = likeliest(core, core.alive()[core.column("named")[core.alive()]])
+    if not len(rows):
         return np.full(len(reports), -1)
+    ours = core.store.address[rows]
+    order = np.argsort(ours, kind="stable")
     where = order[np.minimum(np.searchsorted(ours, reports.address, sorter=order), len(ours) - 1)]
-    return np.where((ours[where] == reports.address) & (reports.address != ""), where, -1)
+    return np.where((ours[where] == reports.address) & (reports.address != ""), rows[where], -1)
 
 
 def _noise(accuracy: Array) -> Floats:
     return np.asarray(accuracy.astype(np.float64) ** 2)[:, None, None] * np.eye(2)
 
 
-def _fits(core: Core, reports: TargetReports, row: Array) -> Array:
-    """Which reports of a known address lie where their track may be."""
+def _positions(core: Core, reports: TargetReports, size: Floats, share: float) -> Measured:
+    """Reports as measurements, at the times at which they were where they say, as far as that is known.
+
+    size: (k, 3) extent of their targets, of whose length the antenna strays by `share`.
+    """
+    noise = _noise(reports.accuracy) + ((share * size[:, 0]) ** 2)[:, None, None] * np.eye(2)
+    late, _ = core.latencies.of(source_keys(reports), reports.time)
+    return Measured.of(
+        reports.time - late, np.stack([reports.east, reports.north], axis=1), noise, speed=reports.speed,
+        course=reports.course, altitude=reports.altitude, sensor=report_sensor(core),
+    )  # fmt: skip
+
+
+def _fits(core: Core, reports: TargetReports, row: Array, young_gate: float) -> Array:
+    """Which reports of a known address lie where their track may be; for tracks of one report, within young_gate."""
     made = row >= 0
-    rows, table = row[made], core.table
-    mine = reports[made]
-    state, covariance = core.filter.predict(table.state[rows], table.covariance[rows], mine.time - table.time[rows])
-    expected = Expected(mine.time, state, covariance, np.zeros(len(rows)), core.extents(rows), np.zeros(len(rows)))
-    along = (ANTENNA_SD * expected.extent[:, 0]) ** 2
-    off = np.stack([mine.east, mine.north], axis=1) - state[:, :2]
-    spread = covariance[:, :2, :2] + _noise(mine.accuracy) + along[:, None, None] * np.eye(2)
+    rows, mine = row[made], reports[made]
+    measured = _positions(core, mine, extents(core.store.records(rows)), ANTENNA_SD)
+    _, (state, covariance) = core.predicted(rows, measured.time)
+    spread = with_latency(state, covariance, _unsure(core, mine, rows))[:, :2, :2] + measured.noise
+    off = measured.position - state[:, :2]
     squared = np.einsum("ni,nij,nj->n", off, np.linalg.inv(spread), off) if len(rows) else np.zeros(0)
-    made[made] = squared <= core.settings.identity.gate
+    young = _alone(core, rows) & (core.store.hits[rows] == 1)
+    gate = np.where(young, young_gate, core.settings.identity.gate)
+    made[made] = (squared <= gate) & _beside_plot(core, mine, rows, measured)
     return np.asarray(made)
+
+
+def _beside_plot(core: Core, reports: TargetReports, rows: Array, measured: Measured) -> Array:
+    """Mask of the reports that lie where a radar has just seen their target.
+
+    The state of a track lies between its plots and its reports, and so does not tell when they part: when a vehicle
+    that the radar does not see drives away from a target that was given its address.
+    """
+    store = core.store
+    velocity, since = store.state[rows, 2:], reports.time - store.radar_time[rows]
+    with np.errstate(invalid="ignore"):
+        there = store.plot_position[rows] + velocity * (measured.time - store.radar_time[rows])[:, None]
+        length = extents(store.records(rows))[:, 0]
+        variance = store.plot_variance[rows] + reports.accuracy.astype(np.float64) ** 2 + (PART_SD * length) ** 2
+        late = _unsure(core, reports, rows) ** 2 + PART_TIME_SD**2
+        variance = variance + late * (velocity**2).sum(axis=1)
+        apart = ((measured.position - there) ** 2).sum(axis=1) > PART_GATE * variance
+    return np.asarray(~(apart & (np.abs(since) < CORROBORATED_S)))
+
+
+def _alone(core: Core, row: Array) -> Array:
+    """Mask of the tracks that no sensor but reports has seen of late."""
+    newest = np.maximum(core.store.radar_time[row], core.store.node_time[row])
+    return np.asarray(newest < core.time - core.settings.reporting.source_memory)
+
+
+def _open_young(core: Core, row: Array, fits: Array) -> Array:
+    """Forget the stated velocity of tracks of one report which the second does not fit; which of `row` those are."""
+    opened = np.flatnonzero((row >= 0) & ~fits)
+    opened = opened[_alone(core, row[opened]) & (core.store.hits[row[opened]] == 1)]
+    rows, store = row[opened], core.store
+    if len(rows):
+        core.count("report_velocity_dropped", len(rows))
+        there = Measured.of(store.time[rows], store.state[rows, :2].copy(), store.covariance[rows, :2, :2].copy())
+        core.filter.start(store, rows, there, unknown_velocity(core, len(rows)))
+        renew(core, rows)
+    return np.asarray(opened)
+
+
+def _begin_anew(core: Core, reports: TargetReports, row: Array) -> Array:
+    """Tracks of reports alone that do not fit for long follow their reports: they begin anew there, and stay what they
+    are. Mask of the reports that were taken so."""
+    store = core.store
+    anew = _alone(core, row) & (store.misfit_reports[row] + 1 >= core.settings.identity.patience)
+    rows, reports = row[anew], reports[anew]
+    if len(rows):
+        core.count("report_restarted", len(rows))
+        measured = _positions(core, reports, np.zeros((len(rows), 3)), 0.0)
+        core.filter.start(store, rows, measured, unknown_velocity(core, len(rows)))
+        renew(core, rows)
+        store.updated[rows] = store.report_time[rows] = reports.time
+        forget_plans(store.look, rows)
+        _describe(core, reports, rows)
+    return anew
 
 
 def _reject(core: Core, row: Array) -> Array:
     """Count reports that do not fit the track (row) of their address; the mask of those whose address leaves it."""
-    table = core.table
-    table.misfit_reports[row] += 1
-    moved = table.misfit_reports[row] >= core.settings.identity.patience
+    store = core.store
+    store.misfit_reports[row] += 1
+    moved = store.misfit_reports[row] >= core.settings.identity.patience
     core.count("report_implausible", int((~moved).sum()))
     core.count("identity_moved", int(moved.sum()))
-    rows = row[moved]
-    clear_identity(core, rows)
-    # a track that no other sensor sees was made by these reports alone: it ends with them
-    alone = (
-        np.maximum(table.radar_time[rows], table.node_time[rows]) < core.time - core.settings.reporting.source_memory
-    )
-    table.updated[rows[alone]] = NEVER
+    clear_identity(core, row[moved])
     return np.asarray(moved)
 
 
@@ -138,68 +218,113 @@ def _apply(core: Core, reports: TargetReports, row: Array) -> None:
     """Update tracks by position and identity of their reports."""
     if not len(row):
         return
-    noise = _noise(reports.accuracy)
-    size = core.extents(row)
-    noise += ((core.settings.measurement.report_centroid_sd * size[:, 0]) ** 2)[:, None, None] * np.eye(2)
-    apply_positions(core, row, reports.time, np.stack([reports.east, reports.north], axis=1), noise, Source.REPORT)
+    reports, row = _for_all_hypotheses(core, reports, row)
+    size, share = extents(core.store.records(row)), core.settings.measurement.report_centroid_sd
+    _learn_latency(core, reports, row, _positions(core, reports, size, share))
+    measured = _positions(core, reports, size, share)
+    predicted, (state, covariance) = core.predicted(row, measured.time)
+    measured.noise[:] += latency_noise(state, covariance, _unsure(core, reports, row))
+    update_tracks(core, predicted, measured, Hypotheses.single(np.arange(len(row))), report_sensor(core), Source.REPORT)
+    core.store.latency_sd[row] = core.latencies.of(source_keys(reports), reports.time)[1]
+    add_score(core, row, report_sensor(core), core.settings.evidence.other_sensor)
     _describe(core, reports, row)
+
+
+def _seen_by_radar(core: Core, reports: TargetReports, row: Array) -> Array:
+    """Mask of the tracks that a radar, too, tells of."""
+    slowest = max([1.0, *(one.period for one in core.clocks)])
+    return np.asarray(core.store.radar_time[row] >= reports.time - CORROBORATED_S * slowest)
+
+
+def _unsure(core: Core, reports: TargetReports, row: Array) -> Floats:
+    """(k,) s, standard deviation of the latency of reports against what is known of their tracks.
+
+    Where only reports tell of a track, it is as late as they are.
+    """
+    sd = core.latencies.of(source_keys(reports), reports.time)[1]
+    return np.where(_seen_by_radar(core, reports, row), sd, 0.0)
+
+
+def _learn_latency(core: Core, reports: TargetReports, row: Array, measured: Measured) -> None:
+    """Where a radar tells where a moving target is, its reports tell how late their source is."""
+    _, (state, covariance) = core.predicted(row, measured.time)
+    late, variance = lateness(state, covariance, measured.position, measured.noise)
+    keys = source_keys(reports)
+    for k in np.flatnonzero(_seen_by_radar(core, reports, row) & np.isfinite(late)):
+        core.latencies.learn(keys[k], float(reports.time[k]), float(late[k]), float(variance[k]))
+
+
+def _for_all_hypotheses(core: Core, reports: TargetReports, row: Array) -> tuple[TargetReports, Array]:
+    """Reports reach all rows of their targets."""
+    if not core.associate.branching:
+        return reports, row
+    alive = core.alive()
+    of, where = np.nonzero(core.store.target[row][:, None] == core.store.target[alive])
+    return reports[of], alive[where]
 
 
 def _describe(core: Core, reports: TargetReports, row: Array) -> None:
     """Write what reports say of tracks besides their position."""
-    table = core.table
-    table.misfit_reports[row] = 0
-    table.on_ground[row] = reports.on_ground
+    store = core.store
+    store.misfit_reports[row] = 0
+    store.on_ground[row] = reports.on_ground
     heard = np.isfinite(reports.altitude)
-    table.altitude[row[heard]] = reports.altitude[heard]
-    table.altitude[row[~heard & reports.on_ground]] = np.nan
+    store.altitude[row[heard]] = reports.altitude[heard]
+    store.altitude[row[~heard & reports.on_ground]] = np.nan
     named = reports.address != ""
-    table.address[row[named]] = reports.address[named]
-    table.simulated[row[named]] = reports.simulated[named]
+    store.address[row[named]] = reports.address[named]
+    store.named[row[named]] = True
+    store.simulated[row[named]] = reports.simulated[named]
     called = reports.callsign != ""
-    table.callsign[row[called]] = reports.callsign[called]
+    store.callsign[row[called]] = reports.callsign[called]
     says = (reports.category > TargetCategory.UNKNOWN) & (reports.category <= TargetCategory.VEHICLE)
-    table.claimed[row[says]] = table.category[row[says]] = reports.category[says]
+    store.claimed[row[says]] = store.category[row[says]] = reports.category[says]
 
 
-def _pairs(core: Core, reports: TargetReports, rows: Array) -> Assignment:
+def _pairs(core: Core, reports: TargetReports, rows: Array) -> Association:
     """Assign reports to the tracks `rows`, whoever they are."""
-    table, at = core.table, float(np.median(reports.time))
-    state, covariance = core.filter.predict(table.state[rows], table.covariance[rows], at - table.time[rows])
-    k = len(rows)
-    penalty = np.where(table.phase[rows] == TrackPhase.TENTATIVE, core.settings.measurement.tentative_penalty, 0.0)
-    expected = Expected(
-        np.full(k, at),
-        state,
-        covariance,
-        np.full(k, WINDOW_LAGS * core.settings.timing.max_lag),
-        core.extents(rows),
-        penalty,
-    )
-    position = np.stack([reports.east, reports.north], axis=1)
-    return core.associate(expected, Measured(reports.time, position, _noise(reports.accuracy)))
+    at = np.full(len(rows), float(np.median(reports.time)))
+    _, moments = core.predicted(rows, at)
+    window = np.full(len(rows), WINDOW_LAGS * core.settings.timing.max_lag)
+    unsure = core.latencies.of(source_keys(reports), reports.time)[1]
+    expected = core.expected(rows, at, moments, window, float(unsure.max()))
+    measured = _positions(core, reports, np.zeros((len(reports), 3)), 0.0)
+    return core.associate(expected, measured, np.arange(len(rows)), np.arange(len(reports), dtype=np.int32))
+
+
+def _taken(answer: Association) -> Array:
+    """(n,) the report that each track takes in its likeliest hypothesis, -1 for none."""
+    hypotheses = answer.hypotheses
+    made = np.full(len(hypotheses.track_first) - 1, -1, np.int64)
+    for track in range(len(made)):
+        first, last = hypotheses.track_first[track : track + 2]
+        best = first + int(np.argmax(hypotheses.log_weight[first:last]))
+        if hypotheses.plot_first[best] < hypotheses.plot_first[best + 1]:
+            made[track] = hypotheses.plot[hypotheses.plot_first[best]]
+    return made
 
 
 def _identify(core: Core, reports: TargetReports) -> None:
     """Give reports of an address that no track bears to the track without a name that fits, or start one."""
     if not len(reports):
         return
-    table = core.table
-    free = np.flatnonzero((core.column("address") == "") & (core.column("updated") > NEVER))
+    alive = likeliest(core, core.alive())
+    free = alive[~core.store.named[alive] & (core.store.updated[alive] > NEVER)]
     answer = _pairs(core, reports, free)
+    taken = _taken(answer)
     row = np.full(len(reports), -1)
     own = np.full(len(reports), np.inf)
     other = np.full(len(reports), np.inf)
     track = np.repeat(np.arange(len(free)), np.diff(answer.first))
-    chosen = answer.measurement[track] == answer.pair
+    chosen = taken[track] == answer.pair
     row[answer.pair[chosen]] = free[track[chosen]]
     own[answer.pair[chosen]] = answer.cost[chosen]
-    rest = answer.measurement[track] < 0
+    rest = taken[track] < 0
     np.minimum.at(other, answer.pair[rest], answer.cost[rest])
     near = np.isin(np.arange(len(reports)), answer.pair)
     unsure = ((row >= 0) & (other < own + core.settings.identity.ambiguity)) | ((row < 0) & near)
     for report in np.flatnonzero(unsure):
-        uid = int(table.uid[row[report]]) if row[report] >= 0 else 0
+        uid = int(core.store.target[row[report]]) if row[report] >= 0 else 0
         unsure[report] = not _repeated(core, str(reports.address[report]), uid)
     core.count("report_ambiguous", int(unsure.sum()))
     core.count("identified", int(((row >= 0) & ~unsure).sum()))
@@ -215,7 +340,7 @@ def _repeated(core: Core, address: str, uid: int) -> bool:
     before, times = core.undecided.get(address, (uid, 0))
     times = times + 1 if before == uid else 1
     core.undecided[address] = (uid, times)
-    if len(core.undecided) > core.table.capacity:
+    if len(core.undecided) > core.store.capacity:
         core.undecided.pop(next(iter(core.undecided)))
     return times > core.settings.identity.patience
 
@@ -224,11 +349,12 @@ def _apply_anonymous(core: Core, reports: TargetReports) -> None:
     """Reports without an address give their position to the track that fits, whoever it is, or start one."""
     if not len(reports):
         return
-    everyone = np.flatnonzero(core.column("updated") > NEVER)
+    alive = likeliest(core, core.alive())
+    everyone = alive[core.store.updated[alive] > NEVER]
     answer = _pairs(core, reports, everyone)
+    taken = _taken(answer)
     row = np.full(len(reports), -1)
-    hit = answer.measurement >= 0
-    row[answer.measurement[hit]] = everyone[hit]
+    row[taken[taken >= 0]] = everyone[taken >= 0]
     _apply(core, reports[row >= 0], row[row >= 0])
     alone = (row < 0) & ~np.isin(np.arange(len(reports)), answer.pair)
     core.count("report_ambiguous", int(((row < 0) & ~alone).sum()))
@@ -236,25 +362,16 @@ def _apply_anonymous(core: Core, reports: TargetReports) -> None:
 
 
 def _start(core: Core, reports: TargetReports) -> None:
+    """Begin tracks; the velocity that their reports state is believed with a doubt."""
     if not len(reports):
         return
-    table = core.table
-    position = np.stack([reports.east, reports.north], axis=1)
     head_start = np.where(reports.address != "", ADDRESS_HEAD_START, 0)
     for number in np.unique(head_start):
         mine = reports[head_start == number]
-        made = start_tracks(
-            core, mine.time, position[head_start == number], _noise(mine.accuracy), Source.REPORT, mine.simulated,
-            head_start=int(number),
+        rows = start_tracks(
+            core, _positions(core, mine, np.zeros((len(mine), 3)), 0.0), stated_velocity(core, mine),
+            report_sensor(core), Source.REPORT, mine.simulated, head_start=int(number),
         )  # fmt: skip
-        rows = np.arange(made.start, made.stop)
-        mine = mine[: len(rows)]
         core.count("report_started", len(rows))
-        speed, course = mine.speed.astype(np.float64), mine.course.astype(np.float64)
-        course = np.where(np.isfinite(course) | ~(speed < STANDING_SPEED), course, 0.0)
-        knows = np.isfinite(speed) & np.isfinite(course) & (speed >= 0) & (speed < MOST_SPEED)
-        k = rows[knows]
-        table.state[k, 2], table.state[k, 3] = (speed * np.sin(course))[knows], (speed * np.cos(course))[knows]
-        table.covariance[k, 2, 2] = table.covariance[k, 3, 3] = (SPEED_SD + SPEED_SD_SHARE * speed[knows]) ** 2
-        table.velocity_unknown[k] = False
-        _describe(core, mine, rows)
+        core.store.latency_sd[rows] = core.latencies.of(source_keys(mine), mine.time)[1][: len(rows)]
+        _describe(core, mine[: len(rows)], rows)

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 LARGEST_CAPACITY = 1_000_000
-"""Tracks: a hundred times what the largest airport has, false ones included. They take 0.4 gigabytes; what asks
-for more is a typing error."""
+"""Tracks: a hundred times what the largest airport has, false ones included. They take 0.8 gigabytes with
+one radar; what asks for more is a typing error."""
 
 
 @dataclass(frozen=True)
@@ -130,32 +130,32 @@ class GroupingSettings:
     """When several plots, or several tracks, are one target.
 
     absorb_margin: m, a plot this far outside the extent of an established track still belongs to it: about a range
-    cell, by which both edges of an echo are unsure. merge_after: checks in a row that must find a track to duplicate
-    another, or to be a fragment of it, before both become one. Tied to a one-second antenna: a check is made once a
-    second (`maintenance.MAINTENANCE_INTERVAL_S`), so that each has seen a turn.
-    starved_after: s without a plot, after which one of two tracks may be the other's duplicate. Tied to a one-second
-    antenna: two turns and what the time of a look varies by.
+    cell, by which both edges of an echo are unsure. merge_after: checks in a row, one a second, that must find a track
+    to duplicate another, or to be a fragment of it, before both become one. merge_named_after: the same where only one
+    of them bears an address and they do not both move fast: a vehicle at walking speed has left what it passes by then.
+    starved_turns: turns, of the fastest radar that sees a track, without a plot, after which it may duplicate another:
+    two, and what the time of a look varies by.
     """
 
     absorb_margin: float = 4.0
     merge_after: int = 3
-    starved_after: float = 2.2
+    merge_named_after: int = 15
+    starved_turns: float = 2.2
 
 
 @dataclass(frozen=True)
 class StartSettings:
     """What starts a track.
 
+    speed_sd: m/s of each component of the velocity of what nothing is known of; 25 m/s twice is a fast take-off.
     ignore_plots_on_buildings: a plot shorter than an aircraft that lies on a building starts none: it is an echo of
     the building. apron_speed_sd: m/s of each component of the velocity of what begins on an apron: nothing is fast
-    among parked aircraft, and 7 m/s is the speed limit of service roads. second_point_after: s, the least time between
-    the two positions that give a first velocity; closer ones would give little but noise. Tied to a one-second antenna:
-    a third of its turn.
+    among parked aircraft, and 7 m/s is the speed limit of service roads.
     """
 
+    speed_sd: float = 25.0
     ignore_plots_on_buildings: bool = True
     apron_speed_sd: float = 7.0
-    second_point_after: float = 0.3
 
 
 @dataclass(frozen=True)

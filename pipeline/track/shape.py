@@ -7,24 +7,27 @@ import math
 import numpy as np
 
 from pipeline.kernels.compiled import allocating
-from pipeline.tables import Plots
 from pipeline.tables.arrays import Array, Floats
 from pipeline.track.settings import ExtentSettings
+
+SETTLED = 3
+"""Extents taken before a track's own extent is known well enough to absorb plots."""
 
 LONGEST_M = 200.0
 """No plot is taken for longer or wider; what is, is clutter or several targets in one echo."""
 
 AXIS_GAIN = 0.2
-"""Fraction of the difference by which a plot turns the long axis. Tied to a one-second antenna: it is taken once a
-plot."""
+"""Fraction a second, of the difference, by which plots turn the long axis."""
 
 HEADING_GAIN = 0.5
-"""Fraction of the difference by which a course turns the heading of a track. Tied to a one-second antenna, as
-AXIS_GAIN."""
+"""Fraction a second, of the difference, by which a course turns the heading of a track."""
+
+MOST_SINCE_S = 1.0
+"""s since the plot before that count at most: the plots of a slower radar are no more exact."""
 
 SUDDEN_TURN = 0.6
-"""rad; a course that differs by more replaces the heading at once: it was wrong, for nothing turns so in a second. Tied
-to a one-second antenna."""
+"""rad; a course that differs by more replaces the heading at once: it was wrong, or the target turned between two slow
+looks. An aircraft on the ground turns by less than 0.4 a second."""
 
 BACKWARDS = -0.5
 """Cosine of the angle between course and heading, below which a slow target moves backwards: more than 120 degrees."""
@@ -42,94 +45,65 @@ QUARTER = 0.785
 """rad (45 degrees); a plot whose long axis lies farther from the track's has length and width exchanged."""
 
 
-def plot_extents(plots: Plots) -> Floats:
-    """(m, 3) length, width in m and bearing in rad modulo pi (nan when unknown) of plots, filled from the polar
-    extents where the extractor gave no axes.
+def extents(rows: Array) -> Floats:
+    """(n, 3) length m, width m and direction rad for gating, of the tracks of records (n,) of the store.
+
+    Zeros where unknown; those seen in fragments whole.
     """
-    made = np.empty((len(plots), 3))
-    _plot_extents(
-        plots.length, plots.width, plots.bearing, plots.range_extent, plots.azimuth_extent, plots.range, plots.azimuth,
-        made,
-    )  # fmt: skip
-    return made
-
-
-def extents(length: Array, width: Array, heading: Array, axis_bearing: Array, least_half_extent: Array) -> Floats:
-    """(n, 3) length m, width m and direction rad of tracks for gating; zeros where unknown. See `TrackTable`."""
-    made = np.empty((len(length), 3))
-    _extents(length, width, heading, axis_bearing, least_half_extent, made)
-    return made
-
-
-def oriented_noise(noise: Floats, extent: Floats, centroid_sd: float) -> Floats:
-    """noise (m, 2, 2) m^2 plus that of an extended target's centroid, `centroid_sd` of its length and of its width."""
-    made = noise.copy()
-    _add_centroid_noise(extent, centroid_sd, made)
+    made = np.empty((len(rows), 3))
+    _extents(rows, made)
     return made
 
 
 def reshape(
-    rule: ExtentSettings, rows: Array, state: Array, covariance: Array, moved: Array, plot: Floats, bearing_sd: Array,
-    length: Array, width: Array, heading: Array, axis_bearing: Array, moving: Array, extent_count: Array,
+    rule: ExtentSettings, store: Array, rows: Array, before: Floats, period: float, time: Floats, extent: Floats,
+    bearing_sd: Array, plot: Array,
 ) -> None:  # fmt: skip
-    """Smooth extent and heading of the tracks `rows` with the plot (k, 3) each took; the columns are changed."""
-    settings = np.array([
-        rule.grow, rule.shrink, rule.start_speed, rule.stop_speed, rule.reverse_speed, rule.bearing_sd,
-        rule.speed_sigmas,
-    ])  # fmt: skip
-    _reshape(
-        settings, rows, state, covariance, moved, plot, bearing_sd, length, width, heading, axis_bearing, moving,
-        extent_count,
+    """Smooth extent and heading of the tracks `rows` (k,) of the store's records with the plot that each took.
+
+    before: (k,) UTC s of the plot before, minus infinity for none: then `period` s count. time: (m,) UTC s, extent:
+    (m, 3) and bearing_sd: (m,) of plots, of which `plot` (k,) are taken, -1 for none.
+    """
+    settings = (
+        math.log1p(-rule.grow), math.log1p(-rule.shrink), math.log1p(-AXIS_GAIN), math.log1p(-HEADING_GAIN),
+        rule.start_speed, rule.stop_speed, rule.reverse_speed, rule.bearing_sd, rule.speed_sigmas,
     )  # fmt: skip
+    _reshape(settings, store, rows, before, period, time, extent, bearing_sd, plot)
 
 
 @allocating
-def _plot_extents(
-    length: Array,
-    width: Array,
-    bearing: Array,
-    deep: Array,
-    turn: Array,
-    distance: Floats,
-    azimuth: Floats,
-    out: Floats,
+def fill_extent(
+    length: float, width: float, bearing: float, deep: float, turn: float, distance: float, azimuth: float, out: Floats
 ) -> None:
-    for k in range(len(out)):
-        along, across, direction = float(length[k]), float(width[k]), float(bearing[k])
-        if not (math.isfinite(along) and along > 0.0):
-            a, b = float(deep[k]), float(turn[k]) * distance[k]
-            a, b = (a if math.isfinite(a) else 0.0), (b if math.isfinite(b) else 0.0)
-            along, across = max(a, b), min(a, b)
-            direction = (azimuth[k] if a >= b else azimuth[k] + 0.5 * math.pi) % math.pi
-        out[k, 0] = min(max(along, 0.0), LONGEST_M)
-        out[k, 1] = min(max(across, 0.0), LONGEST_M) if math.isfinite(across) else 0.0
-        out[k, 2] = direction
+    """Length, width in m and direction in rad modulo pi (nan when unknown) of a plot, into out (3,).
+
+    From the polar extents, `deep` m and `turn` rad, where the extractor gave no axes.
+    """
+    along, across, direction = float(length), float(width), float(bearing)
+    if not (math.isfinite(along) and along > 0.0):
+        a, b = float(deep), float(turn) * distance
+        a, b = (a if math.isfinite(a) else 0.0), (b if math.isfinite(b) else 0.0)
+        along, across = max(a, b), min(a, b)
+        direction = (azimuth if a >= b else azimuth + 0.5 * math.pi) % math.pi
+    out[0] = min(max(along, 0.0), LONGEST_M)
+    out[1] = min(max(across, 0.0), LONGEST_M) if math.isfinite(across) else 0.0
+    out[2] = direction
 
 
 @allocating
-def _extents(
-    length: Floats, width: Floats, heading: Floats, axis_bearing: Floats, least_half_extent: Floats, out: Floats
-) -> None:
+def _extents(rows: Array, out: Floats) -> None:
     for k in range(len(out)):
-        direction = heading[k] if math.isfinite(heading[k]) else axis_bearing[k]
-        least = 2.0 * least_half_extent[k]
-        out[k, 0] = max(length[k] if math.isfinite(length[k]) else 0.0, least)
-        out[k, 1] = max(width[k] if math.isfinite(width[k]) else 0.0, least)
-        out[k, 2] = direction if math.isfinite(direction) else 0.0
+        fill_track_extent(rows[k], out[k])
 
 
 @allocating
-def _add_centroid_noise(extent: Floats, centroid_sd: float, noise: Floats) -> None:
-    for k in range(len(extent)):
-        direction = extent[k, 2]
-        along, across = (centroid_sd * extent[k, 0]) ** 2, (centroid_sd * extent[k, 1]) ** 2
-        if not math.isfinite(direction):
-            direction, across = 0.0, along
-        s, c = math.sin(direction), math.cos(direction)
-        noise[k, 0, 0] += along * s * s + across * c * c
-        noise[k, 1, 1] += along * c * c + across * s * s
-        noise[k, 0, 1] += (along - across) * s * c
-        noise[k, 1, 0] += (along - across) * s * c
+def fill_track_extent(track: Array, out: Floats) -> None:
+    """Length m, width m and direction rad of one track for gating, into out (3,). See `extents`."""
+    direction = track["heading"] if math.isfinite(track["heading"]) else track["axis_bearing"]
+    least = 2.0 * track["least_half_extent"]
+    out[0] = max(track["length"] if math.isfinite(track["length"]) else 0.0, least)
+    out[1] = max(track["width"] if math.isfinite(track["width"]) else 0.0, least)
+    out[2] = direction if math.isfinite(direction) else 0.0
 
 
 @allocating
@@ -146,42 +120,51 @@ def _turn(a: float, b: float) -> float:
 
 @allocating
 def _reshape(
-    rule: Floats, rows: Array, state: Floats, cov: Floats, moved: Array, plot: Floats, bearing_sd: Array,
-    length: Floats, width: Floats, heading: Floats, axis_bearing: Floats, moving: Array, extent_count: Array,
+    rule: tuple[float, float, float, float, float, float, float, float, float], store: Array, rows: Array,
+    before: Floats, period: float, time: Floats, extent: Floats, bearing_sd: Array, plot: Array,
 ) -> None:  # fmt: skip
-    grow, shrink, start_speed, stop_speed = rule[0], rule[1], rule[2], rule[3]
-    reverse_speed, most_bearing_sd, speed_sigmas = rule[4], rule[5], rule[6]
+    log_grow, log_shrink, log_axis, log_heading = rule[0], rule[1], rule[2], rule[3]
+    start_speed, stop_speed, reverse_speed, most_bearing_sd, speed_sigmas = rule[4], rule[5], rule[6], rule[7], rule[8]
     for k in range(len(rows)):
-        i = rows[k]
-        long, short, bearing = plot[k, 0], plot[k, 1], plot[k, 2]
-        sure = math.isfinite(bearing) and (not math.isfinite(bearing_sd[k]) or bearing_sd[k] <= most_bearing_sd)
-        speed = math.hypot(state[i, 2], state[i, 3])
-        noise = math.sqrt(0.5 * (cov[i, 2, 2] + cov[i, 3, 3]))
-        moving[i] = moved[i] and speed > (stop_speed if moving[i] else max(start_speed, speed_sigmas * noise))
+        one, j = store[rows[k]], plot[k]
+        if j < 0:
+            continue
+        long, short, bearing = extent[j, 0], extent[j, 1], extent[j, 2]
+        since = time[j] - before[k] if math.isfinite(before[k]) else period
+        dt = min(max(since, 0.0), MOST_SINCE_S)
+        sure = math.isfinite(bearing) and (not math.isfinite(bearing_sd[j]) or bearing_sd[j] <= most_bearing_sd)
+        x, p, axis, heading = one["state"], one["covariance"], one["axis_bearing"], one["heading"]
+        speed = math.hypot(x[2], x[3])
+        noise = math.sqrt(0.5 * (p[2, 2] + p[3, 3]))
+        least = stop_speed if one["moving"] else max(start_speed, speed_sigmas * noise)
+        one["moving"] = one["moved"] and speed > least
         if sure:
-            if not math.isfinite(axis_bearing[i]):
-                axis_bearing[i] = bearing % math.pi
+            if not math.isfinite(axis):
+                axis = bearing % math.pi
             else:
-                axis_bearing[i] = (axis_bearing[i] + AXIS_GAIN * _axis_difference(bearing, axis_bearing[i])) % math.pi
-        if moving[i]:
-            course = math.atan2(state[i, 2], state[i, 3])
-            known = math.isfinite(heading[i])
-            backwards = known and speed < reverse_speed and math.cos(course - heading[i]) < BACKWARDS
+                axis = (axis - math.expm1(log_axis * dt) * _axis_difference(bearing, axis)) % math.pi
+            one["axis_bearing"] = axis
+        if one["moving"]:
+            course = math.atan2(x[2], x[3])
+            known = math.isfinite(heading)
+            backwards = known and speed < reverse_speed and math.cos(course - heading) < BACKWARDS
             aim = course + math.pi if backwards else course
             if sure and long > LONG_PLOT * short and abs(_axis_difference(bearing, aim)) < AXIS_AGREES:
                 aim += AXIS_SHARE * _axis_difference(bearing, aim)
             if known:
-                difference = _turn(aim, heading[i])
-                aim = heading[i] + difference * (HEADING_GAIN if abs(difference) < SUDDEN_TURN else 1.0)
-            heading[i] = aim % (2 * math.pi)
+                difference = _turn(aim, heading)
+                aim = heading + difference * (-math.expm1(log_heading * dt) if abs(difference) < SUDDEN_TURN else 1.0)
+            heading = aim % (2 * math.pi)
+            one["heading"] = heading
         if not long > 0.0:
             continue
-        pointing = heading[i] if math.isfinite(heading[i]) else axis_bearing[i]
+        pointing = heading if math.isfinite(heading) else axis
         if math.isfinite(bearing) and math.isfinite(pointing) and abs(_axis_difference(bearing, pointing)) > QUARTER:
             long, short = short, long
-        if extent_count[i] == 0:
-            length[i], width[i] = long, short
+        if one["extent_count"] == 0:
+            one["length"], one["width"] = long, short
         else:
-            length[i] += (grow if long > length[i] else shrink) * (long - length[i])
-            width[i] += (grow if short > width[i] else shrink) * (short - width[i])
-        extent_count[i] += 1
+            longer, wider = long - one["length"], short - one["width"]
+            one["length"] -= math.expm1((log_grow if longer > 0.0 else log_shrink) * dt) * longer
+            one["width"] -= math.expm1((log_grow if wider > 0.0 else log_shrink) * dt) * wider
+        one["extent_count"] += 1

@@ -4,35 +4,34 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from pipeline.airport.model import Airport, SurfaceKind
+from pipeline.airport.model import Airport
 from pipeline.contracts.associate import AssociatePart
 from pipeline.contracts.classify import ClassifyPart
 from pipeline.contracts.filter import FilterPart
 from pipeline.contracts.lifecycle import LifecyclePart
 from pipeline.sites import NodeSite, RadarSite
-from pipeline.tables import NodeEvents, Plots, SectorPlots, TargetReports, TrackPhase, Tracks
-from pipeline.tables.arrays import Array
-from pipeline.track.core import SOURCE_TIMES, Core, ZoneLookup, make_core, shift_times, update_lifecycle
-from pipeline.track.maintenance import maintain_tracks
+from pipeline.tables import NodeEvents, Plots, SectorPlots, TargetReports, Tracks
+from pipeline.tables.marks import mark_row, marks_between
+from pipeline.track.core import Core, ZoneLookup, make_core, shift_times
+from pipeline.track.maintenance import MAINTENANCE_INTERVAL_S, keep_house
 from pipeline.track.node_update import take_node_events
-from pipeline.track.radar_update import PAVED, SETTLED, take_sector
+from pipeline.track.plot_pool import POOL, pool_of
 from pipeline.track.report_update import take_target_reports
+from pipeline.track.reported import reported_tracks
+from pipeline.track.sector import take_sector
 from pipeline.track.settings import TrackerSettings
-from pipeline.track.table import NEVER
 
-_SAME = (
-    "id", "number", "phase", "updated", "born", "hits", "misses", "altitude", "on_ground", "category", "address",
-    "callsign",
+_SAVED = (
+    "numbers", "clocks", "false_plots", "undecided", "latencies", "reports_taken", "time", "began", "judged_time",
+    "maintenance_time",
 )  # fmt: skip
-"""Columns that the table of tracks handed out has as they are in the track table."""
-
-_SAVED = ("numbers", "clocks", "waiting", "false_plots", "undecided", "time", "lifecycle_time", "maintenance_time")
-"""Attributes of `Core` that are saved besides the track table and the counters."""
+"""Attributes of `Core` that are saved besides the store, the pools and the counters."""
 
 
 class Tracker:
@@ -75,9 +74,7 @@ class Tracker:
 
     def sector(self, sector: SectorPlots) -> bool:
         """Take the plots of one sector: a whole turn or any part of one. False, counted, when it cannot be taken."""
-        taken = take_sector(self._core, sector)
-        maintain_tracks(self._core)
-        return taken
+        return take_sector(self._core, sector)
 
     def node_events(self, events: NodeEvents) -> NodeEvents:
         """Take node events: they confirm, pull or start tracks near the node. Gives those that were taken."""
@@ -92,12 +89,11 @@ class Tracker:
         core = self._core
         if not math.isfinite(time):
             core.count("time_invalid")
-        elif time < core.time and core.table.n:
+        elif time < core.time and core.store.n:
             core.count("time_backwards")
         else:
             core.time = time
-            core.lifecycle_time = min(core.lifecycle_time, time - 1.0)
-            maintain_tracks(core)
+            keep_house(core, time)
 
     def shift(self, seconds: float) -> None:
         """The clock that all times come from was set: everything remembered becomes later by `seconds`."""
@@ -109,49 +105,13 @@ class Tracker:
         Each stands at the time of its last measurement, coasting ones at the tracker's time; with `time`, all at it.
         Tracks by radar alone that never moved and stand off the pavement are left out unless the settings want them.
         """
-        core, table, n = self._core, self._core.table, self._core.table.n
-        rows = np.flatnonzero((table.phase[:n] != TrackPhase.TENTATIVE) & (table.id[:n] > 0))
-        ahead = np.where(table.phase[rows] == TrackPhase.COASTING, np.maximum(core.time - table.time[rows], 0.0), 0.0)
-        if time is not None:
-            ahead = time - table.time[rows]
-        state, covariance = core.filter.predict(table.state[rows], table.covariance[rows], ahead)
-        seen = self._reportable(rows, state)
-        rows, ahead, state, covariance = rows[seen], ahead[seen], state[seen], covariance[seen]
-        sources = np.zeros(len(rows), np.uint8)
-        for source, name in SOURCE_TIMES.items():
-            sources |= np.where(
-                getattr(table, name)[rows] >= core.time - core.settings.reporting.source_memory, source, 0
-            ).astype("u1")
-        return Tracks.build(
-            len(rows),
-            **{name: getattr(table, name)[rows] for name in _SAME},
-            time=table.time[rows] + ahead,
-            state=state,
-            covariance=covariance,
-            length=np.where(table.extent_count[rows] > 0, table.length[rows], np.nan),
-            width=np.where(table.extent_count[rows] > 0, table.width[rows], np.nan),
-            heading=np.where(table.extent_count[rows] > 0, table.heading[rows], _course(state)),
-            sources=sources,
-            simulated=table.simulated[rows],
-            zone=core.zones.zone(state[:, 0], state[:, 1]),
-            runway=core.zones.runway(state[:, 0], state[:, 1]),
-        )
-
-    def _reportable(self, rows: Array, state: Array) -> Array:
-        core, table = self._core, self._core.table
-        kind = core.zones.kind(state[:, 0], state[:, 1])
-        known = (table.address[rows] != "") | (table.node_time[rows] > NEVER) | (table.report_time[rows] > NEVER)
-        # a track that its radar has lost does not go on through a building
-        lost = ~known & (table.phase[rows] == TrackPhase.COASTING) & (kind == SurfaceKind.BUILDING)
-        if core.settings.reporting.fixed_off_pavement:
-            return np.asarray(~lost)
-        large = (table.length[rows] >= core.settings.extent.aircraft_length) & (table.extent_count[rows] >= SETTLED)
-        return np.asarray((known | table.moved[rows] | large | PAVED[kind]) & ~lost)
+        return reported_tracks(self._core, time)
 
     def save(self) -> dict[str, Any]:
         """The whole state, as copies of arrays and plain values, for `restore` of a tracker of the same make."""
         core = self._core
-        own = {"table": core.table.save(), "counters": dict(core.counters)}
+        pools = [{name: pool[name].copy() for name in POOL.names or ()} for pool in core.pools]
+        own = {"store": core.store.save(), "pools": pools, "counters": dict(core.counters)}
         return {**own, **{name: copy.deepcopy(getattr(core, name)) for name in _SAVED}}
 
     def restore(self, saved: dict[str, Any]) -> None:
@@ -159,7 +119,8 @@ class Tracker:
         core = self._core
         if len(saved["clocks"]) != len(core.radars):
             raise ValueError("the saved tracks do not fit this tracker")
-        core.table.restore(saved["table"])
+        core.store.restore(saved["store"])
+        core.pools = [pool_of(columns) for columns in saved["pools"]]
         core.counters.clear()
         core.counters.update(saved["counters"])
         for name in _SAVED:
@@ -175,38 +136,49 @@ class Tracker:
         )  # fmt: skip
         own, self._core = self._core, spare
         try:
-            for turn in range(8 if site else 0):
-                self.sector(_made_up_sector(core.radars[0], turn))
-            at = {"time": 1e9 + 8.0}
-            self.target_reports(
-                TargetReports.build(1, **at, address="abcdef", east=0.0, north=0.0, speed=1.0, course=0.0)
-            )
+            for turn in range(WARM_TURNS if site else 0):
+                for sector in _made_up_turn(core.radars[0], turn):
+                    self.sector(sector)
+            for second in range(3):
+                self.target_reports(_made_up_report(second))
+                self.tracks()
             if core.nodes:
-                self.node_events(NodeEvents.build(1, **at, node=0, speed=5.0))
+                self.node_events(NodeEvents.build(1, time=WARM_TIME + WARM_TURNS, node=0, speed=5.0))
             self.tracks()
-            update_lifecycle(spare)
+            self.tracks(WARM_TIME + WARM_TURNS)
+            keep_house(spare, WARM_TIME + WARM_TURNS + MAINTENANCE_INTERVAL_S)
         finally:
             self._core = own
 
 
-COURSE_SPEED = 2.0
-"""m/s, above which the direction of motion is told as heading; below it is noise."""
+WARM_TURNS = 12
+"""Turns of the made-up input: as many as it takes until targets are confirmed, and what was seen once is forgotten."""
+
+WARM_TIME = 1e9
+"""UTC s at which the made-up input begins."""
+
+WARM_SECTORS = 32
+"""Sectors of a made-up turn, so that plots wait for those of the next sector."""
 
 
-def _course(state: Array) -> Array:
-    """Direction of motion rad (n,), nan below COURSE_SPEED."""
-    speed = np.hypot(state[:, 2], state[:, 3])
-    return np.where(speed > COURSE_SPEED, np.arctan2(state[:, 2], state[:, 3]) % (2 * np.pi), np.nan)
+def _made_up_report(second: int) -> TargetReports:
+    """Reports of two moving targets side by side with an address, which no radar sees, and of one without."""
+    return TargetReports.build(
+        3, time=WARM_TIME + WARM_TURNS + 0.1 * second, address=["abcdef", "abcdee", ""], east=2.0 * second,
+        north=[0.0, 30.0, 900.0], speed=20.0, course=1.5,
+    )  # fmt: skip
 
 
-def _made_up_sector(site: RadarSite, turn: int) -> SectorPlots:
-    """One turn of a radar with two targets and a split one, for warm-up."""
+def _made_up_turn(site: RadarSite, turn: int) -> Iterator[SectorPlots]:
+    """One turn of a radar, for warm-up: two targets, a split one, one that appears late, and one that is seen once."""
     a = site.video.azimuths
-    distance = np.array([300.0, 310.0, 600.0])
-    azimuth = np.array([1.0, 1.0, 2.0])
+    late, once = turn >= WARM_TURNS - 3, turn == 2
+    distance = np.array([300.0, 310.0, 600.0] + [900.0] * late + [1200.0] * once)
+    azimuth = np.array([1.0, 1.0, 1.25] + [3.0] * late + [4.0] * once)
+    begun = WARM_TIME + turn * site.video.period_s
     plots = Plots.build(
-        3,
-        time=1e9 + turn + azimuth / (2 * np.pi),
+        len(distance),
+        time=begun + azimuth / (2 * np.pi) * site.video.period_s,
         east=site.east + distance * np.sin(azimuth),
         north=site.north + distance * np.cos(azimuth),
         covariance=9.0 * np.eye(2),
@@ -214,7 +186,7 @@ def _made_up_sector(site: RadarSite, turn: int) -> SectorPlots:
         azimuth=azimuth,
         range_extent=30.0,
         azimuth_extent=0.05,
-        length=np.array([30.0, 8.0, 8.0]),
+        length=np.where(distance == distance[0], 30.0, 8.0),
         width=4.0,
         cells=10,
         mean_amplitude=50.0,
@@ -222,4 +194,11 @@ def _made_up_sector(site: RadarSite, turn: int) -> SectorPlots:
         bearing=1.0,
         bearing_sd=0.1,
     )
-    return SectorPlots(0, turn, 1e9 + turn + 1.0, turn * a, (turn + 1) * a, plots)
+    own = azimuth / (2 * np.pi) * a
+    ends = [a * k // WARM_SECTORS for k in range(WARM_SECTORS + 1)]
+    for low, high in pairwise(ends):
+        first, last = turn * a + low, turn * a + high
+        mark = marks_between(first, last, a)
+        passed = WARM_TIME + mark_row(mark, a) / a * site.video.period_s
+        time = WARM_TIME + last / a * site.video.period_s
+        yield SectorPlots(0, turn, time, first, last, plots[(own >= low) & (own < high)], mark=mark, mark_time=passed)

@@ -91,7 +91,8 @@ class ValueCodec:
         return b"".join(head + writer.parts)
 
     def decode(self, data: codec.Octets) -> Any:
-        """The value of these octets, which may come from anywhere. Raises ValueError for all that are not well formed.
+        """The value of these octets, which may come from anywhere. Raises ValueError for all that are not well formed,
+        and of these OtherFormError for classes and tables that this version does not have, or declares otherwise.
 
         Fields of dataclasses are set as they were, and those that were not written to their defaults; no __init__ and
         no __post_init__ runs.

@@ -71,7 +71,7 @@ class ValueReader:
         self._older: dict[int, tuple[type, list[str]]] = {}
 
     def classes(self, described: dict[type, bytes]) -> None:
-        """Read the head; ValueError naming a class that is not registered, or that has other fields here.
+        """Read the head; OtherFormError naming a class that is not registered, or that has other fields here.
 
         A class that was written without fields that have a default here is taken.
         """
@@ -90,10 +90,11 @@ class ValueReader:
                 continue
             name, *fields = description.decode("utf-8", "replace").split() or ["?"]
             here = registered.get(name)
+            error = codec.OtherFormError if reference == zlib.crc32(description) else ValueError
             if here is None:
-                raise ValueError(f"{name} is not registered")
-            if kind is not None or reference != zlib.crc32(description) or not self._is_older(here, fields):
-                raise ValueError(f"{name} was written with the fields {fields}; here they are {[*self._fields[here]]}")
+                raise error(f"{name} is not registered")
+            if kind is not None or error is ValueError or not self._is_older(here, fields):
+                raise error(f"{name} was written with the fields {fields}; here they are {[*self._fields[here]]}")
             self._older[reference] = (here, fields)
 
     def _is_older(self, kind: type, written: list[str]) -> bool:

@@ -46,7 +46,7 @@ def test_every_file_that_names_numba_or_a_decorator_of_kernels_counts() -> None:
     counted = {path.relative_to(kernel_cache.ROOT).as_posix() for path in kernel_cache.kernel_sources()}
     for known in ("compiled", "bits", "tiles", "adaptive", "growth", "correlate", "recent_rows", "component_state"):
         assert f"pipeline/kernels/{known}.py" in counted
-    assert {"pipeline/detect/ca.py", "pipeline/track/look.py", "app/ingest/socket_kernel.py"} <= counted
+    assert {"pipeline/detect/ca.py", "pipeline/track/schedule.py", "app/ingest/socket_kernel.py"} <= counted
     assert "pipeline/detect/macro_cells.py" in counted  # its constants are compiled into the kernels of `hybrid`
     assert "pipeline/detect/calibration.py" not in counted
 
@@ -55,7 +55,7 @@ def test_every_file_that_names_numba_or_a_decorator_of_kernels_counts() -> None:
     ("name", "text"),
     [
         ("pipeline/kernels/compiled.py", "from numba import njit\n"),
-        ("pipeline/track/look.py", "from pipeline.kernels.compiled import allocating\n"),
+        ("pipeline/track/schedule.py", "from pipeline.kernels.compiled import allocating\n"),
         ("pipeline/kernels/bits.py", "from numba import extending\n"),
         ("app/ingest/socket_kernel.py", "import numba\n"),
     ],

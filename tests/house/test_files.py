@@ -64,10 +64,17 @@ def test_what_the_readme_points_to_is_there() -> None:
     pictures = re.findall(r"!\[[^]]+\]\(([^)]+)\)", text)
     assert len(pictures) == 3
     links = [one for one in re.findall(r"\]\(([^)#]+)\)", text) if "://" not in one]
-    assert set(pictures) | {"docs/journal.md"} <= set(links)
+    assert set(pictures) | {"docs/journal.md", "docs/tracker.md"} <= set(links)
     assert [one for one in links if not (ROOT / one).is_file()] == []
     given = set(re.findall(r"\b(AIRSIDE_[A-Z0-9_]+)=", text)) - {"AIRSIDE_SETTINGS"}
     assert [one for one in given if not a_setting(one)] == []
+
+
+def test_the_files_that_the_documents_name_are_there() -> None:
+    for document in sorted((ROOT / "docs").glob("*.md")):
+        named = re.findall(r"`((?:pipeline|app|tests)/[a-z0-9_./]*)`", document.read_text())
+        assert named, document.name
+        assert [one for one in named if not (ROOT / one).exists()] == []
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")

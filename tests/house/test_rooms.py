@@ -75,9 +75,9 @@ def test_no_room_is_above_one_that_imports_it() -> None:
 @pytest.mark.parametrize(
     ("path", "source", "word"),
     [
-        ("pipeline/filter/new.py", "from pipeline.track.table import TrackTable\n", "filter may not import track"),
+        ("pipeline/filter/new.py", "from pipeline.track.store import TrackStore\n", "filter may not import track"),
         ("pipeline/filter/new.py", "from pipeline.associate.gnn import PART\n", "associate"),
-        ("pipeline/filter/new.py", "import pipeline.track.table as t\n", "track"),
+        ("pipeline/filter/new.py", "import pipeline.track.store as t\n", "track"),
         ("pipeline/filter/new.py", "from pipeline import engine, sites\n", "engine"),
         ("pipeline/filter/new.py", "def late():\n    from pipeline.track import core\n", "track"),
         ("pipeline/filter/new.py", "from ..track import core\n", "may not import ."),

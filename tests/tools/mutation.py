@@ -29,7 +29,8 @@ ROOT = Path(__file__).resolve().parents[2]
 ROOMS = ("track", "filter", "associate", "lifecycle", "group")
 """Folders of pipeline/ that are mutated."""
 
-TESTS = (*(f"tests/pipeline/{room}" for room in (*ROOMS, "contracts")), "tests/pipeline/test_engine.py")
+TESTS = (*(f"tests/pipeline/{room}" for room in ROOMS), "tests/pipeline/test_engine.py", "tests/proof")
+"""Folders and files of the tests that a mutation is held against, those that take longest at the end."""
 
 EQUIVALENT = Path(__file__).with_name("equivalent_mutants.toml")
 
@@ -57,7 +58,7 @@ def main(words: Sequence[str] | None = None) -> int:
         print(f"{len(chosen)} of {len(every):,} mutations, seed {options.seed}", flush=True)
         if options.json is not None:
             check_writable(options.json)
-        outcomes = try_all(chosen, options.jobs)
+        outcomes = try_all(chosen, options.jobs, options.deselect)
     except (TreeError, ValueError, OSError) as error:
         print(f"mutation: {error}", file=sys.stderr)
         return 2
@@ -102,17 +103,32 @@ def sample(
     return fit[:size]
 
 
-def tests_for(mutant: Mutant) -> list[str]:
-    """The tests of the mutant's room, then all others."""
-    own = f"tests/{Path(mutant.path).parent.as_posix()}"
-    return sorted(TESTS, key=lambda one: one != own)
+def files_of_tests(root: Path = ROOT) -> list[str]:
+    """All files of TESTS that are there."""
+    found = [path for one in TESTS for path in ([root / one] if one.endswith(".py") else _tests_in(root / one))]
+    return [path.relative_to(root).as_posix() for path in found if path.is_file()]
 
 
-def try_all(chosen: Sequence[Mutant], jobs: int) -> list[Outcome]:
-    """Try each in one of `jobs` copies of the project and print what became of it; in the order given."""
+def tests_for(mutant: Mutant, files: Sequence[str]) -> list[str]:
+    """The test file named after the mutant's source, then those of its room, then all others."""
+    source = Path(mutant.path)
+    room = f"tests/{source.parent.as_posix()}/"
+    return sorted(files, key=lambda one: (one != f"{room}test_{source.name}", not one.startswith(room)))
+
+
+def _tests_in(folder: Path) -> list[Path]:
+    return sorted(folder.rglob("test_*.py"))
+
+
+def try_all(chosen: Sequence[Mutant], jobs: int, deselected: Sequence[str] = ()) -> list[Outcome]:
+    """Try each in one of `jobs` copies of the project and print what became of it; in the order given.
+
+    deselected: tests that are left out, as they fail without a mutation.
+    """
     with tempfile.TemporaryDirectory(prefix="airside-mutation-") as folder, ThreadPoolExecutor(jobs) as pool:
-        trees = [Tree(ROOT, Path(folder).resolve() / str(k)) for k in range(jobs)]
-        took = max(pool.map(lambda tree: tree.prove(TESTS, FIRST_LIMIT_S), trees))
+        files = files_of_tests()
+        trees = [Tree(ROOT, Path(folder).resolve() / str(k), deselected) for k in range(jobs)]
+        took = max(pool.map(lambda tree: tree.prove(files, FIRST_LIMIT_S), trees))
         limit = COMPILING_S + LIMIT_FACTOR * took
         print(f"unchanged, the tests pass in {took:.0f} s; a mutant may take {limit:.0f} s", flush=True)
         free = queue.SimpleQueue[Tree]()
@@ -122,7 +138,7 @@ def try_all(chosen: Sequence[Mutant], jobs: int) -> list[Outcome]:
         def attempt(mutant: Mutant) -> Outcome:
             tree = free.get()
             try:
-                return tree.attempt(mutant, tests_for(mutant), limit)
+                return tree.attempt(mutant, tests_for(mutant, files), limit)
             finally:
                 free.put(tree)
 
@@ -186,6 +202,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--jobs", type=_positive, default=1, help="copies of the project that work side by side (1)")
     parser.add_argument("--rooms", nargs="+", choices=ROOMS, default=ROOMS, help="folders of pipeline/ (all five)")
     parser.add_argument("--only", metavar="TEXT", help="only mutations whose name holds this text")
+    parser.add_argument(
+        "--deselect", action="append", default=[], metavar="TEST", help="leave out a test, as pytest does; repeatable"
+    )
     parser.add_argument("--list", action="store_true", help="print the names of the sample and try nothing")
     parser.add_argument("--least", type=float, default=0.0, help="exit with 1 when a smaller share is killed (0)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what became of each as JSON")

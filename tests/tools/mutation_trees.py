@@ -45,9 +45,13 @@ class Outcome:
 
 
 class Tree:
-    """A copy of the project at `folder`/tree with kernels compiled for it, and what its tests took unchanged."""
+    """A copy of the project at `folder`/tree with kernels compiled for it, and what its tests took unchanged.
 
-    def __init__(self, root: Path, folder: Path) -> None:
+    deselected: tests that are never run, by the names or the starts of names that pytest knows them by.
+    """
+
+    def __init__(self, root: Path, folder: Path, deselected: Sequence[str] = ()) -> None:
+        self._deselected = [f"--deselect={one}" for one in deselected]
         self._tree, self._kernels, self._spare = folder / "tree", folder / "kernels", folder / "spare"
         self._tree.mkdir(parents=True)
         for name in COPIED:
@@ -115,7 +119,7 @@ class Tree:
 
     def _tests(self, tests: Sequence[str], kernels: Path, limit: float) -> tuple[int | None, str]:
         options = ["-x", "-q", "-rfE", "--tb=no", "--no-header", "-p", "no:cacheprovider", "--hypothesis-seed=0"]
-        return self._python(["-m", "pytest", *options, *tests], kernels, limit)
+        return self._python(["-m", "pytest", *options, *self._deselected, *tests], kernels, limit)
 
     def _python(self, words: Sequence[str], kernels: Path, limit: float) -> tuple[int | None, str]:
         """Run Python in the copy; its exit code (None past the limit, s) and what it printed."""

@@ -93,11 +93,30 @@ def test_a_project_whose_tests_fail_unchanged_is_refused(root: Path, tmp_path: P
         Tree(broken, tmp_path / "copies").prove(TESTS[:1], LIMIT)
 
 
-def test_the_tests_of_the_own_room_come_first() -> None:
+def test_the_tests_named_after_the_source_come_first_then_those_of_its_room() -> None:
     found = one_of("pipeline/filter/plain.py", "0", "1")
-    assert mutation.tests_for(found)[0] == "tests/pipeline/filter"
-    assert sorted(mutation.tests_for(found)) == sorted(mutation.TESTS)
+    room = "tests/pipeline/filter"
+    files = ["tests/pipeline/track/test_plain.py", f"{room}/test_other.py", f"{room}/test_plain.py"]
+    assert mutation.tests_for(found, files) == [files[2], files[1], files[0]]
+
+
+def test_all_tests_named_are_there(root: Path) -> None:
     assert all((ROOT / one).exists() for one in mutation.TESTS)
+    assert "tests/pipeline/track/test_store.py" in mutation.files_of_tests()
+    assert mutation.files_of_tests(root) == [
+        "tests/pipeline/track/test_outer.py", "tests/pipeline/filter/test_plain.py"
+    ]  # fmt: skip
+
+
+def test_a_deselected_test_is_not_run(root: Path, tmp_path: Path) -> None:
+    name = "tests/pipeline/filter/test_plain.py"
+    broken = tmp_path / "broken"
+    shutil.copytree(root, broken)
+    with (broken / name).open("a") as file:
+        file.write("def test_that_fails():\n    assert False\n")
+    tree = Tree(broken, tmp_path / "copies", [f"{name}::test_that_fails"])
+    assert tree.prove([name], LIMIT) > 0
+    assert tree.attempt(one_of("pipeline/filter/plain.py", "a + b", "(a - b)"), [name], LIMIT).killed
 
 
 def test_equivalent_ones_are_set_aside_and_others_take_their_place() -> None:

@@ -22,6 +22,8 @@ from typing import Any, Literal, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.tables import TargetReports
+
 Trial = Mapping[str, NDArray[Any]]
 """What one trial found, by name."""
 
@@ -143,6 +145,18 @@ class RecordedVideo:
     bits: int
     range_step_m: float = 3.0
     first_range_m: float = 0.0
+    name: str = field(default="")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedReports:
+    """Recorded target reports handed to an experiment that works on some (its field `reports`).
+
+    smoothed: the recording was smoothed, so that its positions have less noise than those of a sensor.
+    """
+
+    reports: TargetReports
+    smoothed: bool = False
     name: str = field(default="")
 
 

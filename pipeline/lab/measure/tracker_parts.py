@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 
 from pipeline.associate.gnn import GlobalNearestNeighbour
-from pipeline.contracts.associate import Expected, Measured
+from pipeline.contracts.associate import Expected
+from pipeline.contracts.filter import Prior
+from pipeline.contracts.measured import Hypotheses, Measured
 from pipeline.filter.kalman import Kalman
 from pipeline.lab.measure.stopwatch import BenchRow, Stopwatch
 from pipeline.lab.measure.tracker_workload import EPOCH, Field
-from pipeline.tables.arrays import Floats
+from pipeline.track.store import TrackStore
 
 SLOW_REPEATS = 3
 """Turns of what takes a hundred times as long."""
@@ -23,24 +25,37 @@ def bench_tracker_parts(watch: Stopwatch, targets: int = 1000, peers: bool = Tru
     kalman, associate = Kalman(), GlobalNearestNeighbour()
     rng = np.random.default_rng(seed)
     plots = Field(targets, seed=seed).scan(0)
-    state = np.zeros((targets, 4))
-    state[:, :2] = rng.uniform(-1.0, 1.0, (targets, 2)) * Field(targets).half
+    place = rng.uniform(-1.0, 1.0, (targets, 2)) * Field(targets).half
     real = min(targets, len(plots))
-    state[:real, 0], state[:real, 1] = plots.east[:real] + 1.0, plots.north[:real] - 1.0
-    covariance = np.tile(np.diag([4.0, 4.0, 2.0, 2.0]), (targets, 1, 1))
-    at = np.full(targets, EPOCH + 0.5)
-    extent = np.tile([12.0, 9.0, 0.0], (targets, 1))
-    expected = Expected(at, state, covariance, np.full(targets, 1.0), extent, np.zeros(targets))
-    measured = Measured(plots.time, np.stack([plots.east, plots.north], axis=1), plots.covariance)
-    dt, noise = np.ones(targets), np.tile(4.0 * np.eye(2), (targets, 1, 1))
-    position: Floats = state[:, :2] + rng.normal(0, 2, (targets, 2))
+    place[:real] = np.stack([plots.east[:real] + 1.0, plots.north[:real] - 1.0], axis=1)
+    noise = np.tile(4.0 * np.eye(2), (targets, 1, 1))
+    store, rows = TrackStore(targets, 1, kalman.columns), np.arange(targets)
+    prior = Prior(np.zeros((targets, 2)), np.tile(2.0 * np.eye(2), (targets, 1, 1)), np.ones(targets, np.bool_))
+    kalman.start(store, rows, Measured.of(np.full(targets, EPOCH), place, noise), prior)
+    begun = store.filter.copy(), store.time.copy()
+    taken = Measured.of(np.full(targets, EPOCH + 1.0), place + rng.normal(0, 2, (targets, 2)), noise)
+    each = Hypotheses.single(rows)
+
+    def settle(turn: int) -> None:
+        store.filter[:], store.time[:] = begun
 
     def filtering(_: Any) -> None:
-        kalman.update(*kalman.predict(state, covariance, dt), np.zeros(targets), position, noise)
+        kalman.update(store, kalman.predict(store, rows, taken.time), taken, each)
 
-    yield watch.row("filter", _nothing, filtering, note=f"predict and update of {targets:,} tracks")
+    settle(0)
+    moments = kalman.moments(kalman.predict(store, rows, np.full(targets, EPOCH + 0.5)))
+    expected = Expected(
+        np.full(targets, EPOCH + 0.5), moments.mean, moments.covariance, np.full(targets, 1.0),
+        np.tile([12.0, 9.0, 0.0], (targets, 1)), np.zeros(targets), rows, np.zeros(targets),
+    )  # fmt: skip
+    measured = Measured.of(plots.time, np.stack([plots.east, plots.north], axis=1), plots.covariance)
+    every = np.arange(len(plots), dtype=np.int32)
+    yield watch.row("filter", settle, filtering, note=f"predict and update of {targets:,} tracks")
     yield watch.row(
-        "associate", _nothing, lambda _: associate(expected, measured), note=f"gate and assign {len(plots):,} plots"
+        "associate",
+        _nothing,
+        lambda _: associate(expected, measured, rows, every),
+        note=f"gate and assign {len(plots):,} plots",
     )
     if peers:
         yield _filterpy(Stopwatch(watch.clock, SLOW_REPEATS, watch.frames), targets)

@@ -13,6 +13,10 @@ from pipeline.tables import TargetClass, TargetReports
 VEHICLE_ERROR = 2.5
 """Standard deviation, in metres, of the positions that simulated vehicles report."""
 
+RECORD_SOURCE, BEACON_SOURCE = "traffic-record", "beacons"
+"""Sources of the reports: recorded aircraft are reported where the record of the traffic has them, simulated targets by
+transmitters of their own."""
+
 
 class ReportSimulator:
     """One report a second of every target whose transponder is heard, each at its own phase of the second.
@@ -58,4 +62,5 @@ class ReportSimulator:
             on_ground=seen.on_ground,
             category=np.where(seen.category == TargetClass.AIRCRAFT, 1, 2),
             simulated=seen.simulated,
+            source=np.where(seen.simulated, BEACON_SOURCE, RECORD_SOURCE),
         )

@@ -183,8 +183,9 @@ def test_node_events_and_reports_come_in(http: httpx.Client, server: Server) -> 
     many = [{"time": now, "node": "node-1"}, {"time": now + 1, "node": "node-1", "kind": "left", "speed_mps": 4.0}]
     assert http.post("/api/v1/nodes/events", json=many).json() == {"taken": 2}
     assert server.service.node_events[-1].speed[1] == 4.0
-    report = {"time": now, "lat": 48.7233, "lon": 2.3794, "address": "39ABCD"}
+    report = {"time": now, "lat": 48.7233, "lon": 2.3794, "address": "39ABCD", "source": "adsb"}
     assert http.post("/api/v1/targets/reports", json=report).json() == {"taken": 1}
+    assert server.service.target_reports[-1].source[0] == "adsb"
     assert server.service.target_reports[-1].address[0] == "39abcd"
 
 

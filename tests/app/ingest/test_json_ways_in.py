@@ -106,7 +106,8 @@ def test_whatever_comes_in_is_taken_or_refused(body: bytes) -> None:
 def test_a_report_in_local_metres() -> None:
     report = parse_target_reports(
         b'{"time":1700000000,"lat":48.725,"lon":2.36,"address":"3C66A1","callsign":"dlh123 ","speed_mps":8,'
-        b'"course_deg":-90,"altitude_m":0,"on_ground":false,"category":"aircraft","accuracy_m":3}',
+        b'"course_deg":-90,"altitude_m":0,"on_ground":false,"category":"aircraft","accuracy_m":3,'
+        b'"source":"MLAT_1.north-wes"}',
         FRAME,
     )
     assert abs(report.east[0]) < 1e-6
@@ -114,8 +115,9 @@ def test_a_report_in_local_metres() -> None:
     assert (report.address[0], report.callsign[0], report.category[0]) == ("3c66a1", "DLH123", TargetCategory.AIRCRAFT)
     assert report.course[0] == pytest.approx(math.radians(270))
     assert not report.on_ground[0]
+    assert report.source[0] == "MLAT_1.north-wes"
     bare = parse_target_reports(b'[{"time":1700000000,"lat":48.7,"lon":2.4}]', FRAME)
-    assert bare.address[0] == ""
+    assert bare.address[0] == bare.source[0] == ""
     assert math.isnan(bare.speed[0])
     assert bare.on_ground[0]
     assert len(parse_target_reports(b"[]", FRAME)) == 0
@@ -133,6 +135,11 @@ def test_a_report_in_local_metres() -> None:
         ("course_deg", 1e9, "course_deg"),
         ("accuracy_m", 0, "accuracy_m"),
         ("category", "bird", "bird"),
+        ("source", "a" * 17, "source must be at most 16"),
+        ("source", "adsb 1", "source"),
+        ("source", "adsb\n", "source"),
+        ("source", "ädsb", "source"),
+        ("source", 1, "source"),
     ],
 )
 def test_bad_reports_are_refused_with_a_reason(field: str, value: object, says: str) -> None:

@@ -9,6 +9,7 @@ from pipeline.lifecycle.fading import Fading
 from pipeline.lifecycle.m_of_n import MOfN
 from pipeline.lifecycle.score import Score
 from pipeline.tables import TrackPhase
+from tests.pipeline.contracts.lifecycle import evidence
 
 
 @pytest.mark.parametrize("part", [Fading, MOfN, Score])
@@ -22,8 +23,7 @@ from pipeline.tables import TrackPhase
         ({"identified_silence": 9.9}, "coast_silence, delete_silence and identified_silence"),
         ({"coast_after": 0}, "coast_after"),
         ({"coast_after": 9}, "coast_after"),
-        ({"start_speed_sd": 0.0}, "start_speed_sd and max_position_sd"),
-        ({"max_position_sd": 0.0}, "start_speed_sd and max_position_sd"),
+        ({"max_position_sd": 0.0}, "max_position_sd"),
     ],
 )
 def test_settings_out_of_bounds_are_refused_by_name(part: type[Fading], words: dict[str, float], message: str) -> None:
@@ -34,16 +34,18 @@ def test_settings_out_of_bounds_are_refused_by_name(part: type[Fading], words: d
 @pytest.mark.parametrize("part", [Fading, MOfN, Score])
 def test_settings_at_their_bounds_are_taken(part: type[Fading]) -> None:
     part(coast_silence=0.3, coast_after=8, delete_misses=8)  # a radar that turns several times a second
-    part(coast_silence=7.0, delete_silence=7.0, identified_silence=7.0, start_speed_sd=0.1, max_position_sd=0.1)
+    part(coast_silence=7.0, delete_silence=7.0, identified_silence=7.0, max_position_sd=0.1)
 
 
 def fade(
     misses: int = 0, silence: float = 0.0, *, confirmed: bool = True, identified: bool = False, sd: float = 1.0
 ) -> tuple[TrackPhase, bool]:
-    phase, ended = Fading().fade(
-        np.array([TrackPhase.CONFIRMED if confirmed else TrackPhase.TENTATIVE], np.uint8),
-        np.array([confirmed]), np.array([misses]), np.array([silence]), np.array([identified]), np.array([sd]),
+    """Of a target that one radar has seen."""
+    given = evidence(
+        phase=TrackPhase.CONFIRMED if confirmed else TrackPhase.TENTATIVE, history=1 << misses, looks=20,
+        misses=misses, silence=silence, identified=identified, position_sd=sd,
     )  # fmt: skip
+    phase, ended = Fading().fade(given, np.array([confirmed]))
     return TrackPhase(int(phase[0])), bool(ended[0])
 
 

@@ -10,8 +10,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.tables import NodeEvents, Plots, Table, TargetReports, Tracks
-from pipeline.tables.codec import CodecError, decode, encode, known_tables, layout_of, table_name
+from pipeline.tables.codec import (
+    CodecError,
+    OtherColumnsError,
+    OtherFormError,
+    decode,
+    encode,
+    known_tables,
+    layout_of,
+    table_name,
+)
 from tests.pipeline.tables.made import KINDS, same_bits, table_of, tables
+from tests.support.older_forms import older_table
 
 
 @given(tables, st.booleans(), st.booleans())
@@ -133,3 +143,71 @@ def test_the_layout_tells_every_column_in_order() -> None:
     }  # fmt: skip
     assert table_name(encode(Tracks.empty())) == "Tracks"
     assert {kind.__name__ for kind in KINDS} <= set(known_tables())
+
+
+def test_the_octets_of_tests_are_those_of_the_codec() -> None:
+    for kind in KINDS:
+        assert older_table(table_of(kind, 3, 5)) == encode(table_of(kind, 3, 5))
+
+
+@pytest.mark.parametrize("copy", [False, True])
+@pytest.mark.parametrize("rows", [0, 1, 5])
+def test_columns_that_were_not_yet_written_take_their_default(rows: int, copy: bool) -> None:
+    reports = table_of(TargetReports, rows, 6)
+    back = decode(older_table(reports, ("source", "altitude")), copy=copy)
+    assert same_bits(back, reports.replace(source="", altitude=np.nan))
+    back.replace(source="adsb")
+
+
+@pytest.mark.parametrize("copy", [False, True])
+@pytest.mark.parametrize(("narrow", "least", "most"), [("<i4", -(2**31), 2**31 - 1), ("<i2", -(2**15), 2**15 - 1)])
+def test_integers_that_were_written_narrower_become_wider(narrow: str, least: int, most: int, copy: bool) -> None:
+    tracks = table_of(Tracks, 3, 7).replace(id=[least, -1, most])
+    back = decode(older_table(tracks, dtypes={"id": narrow}), Tracks, copy=copy)
+    assert same_bits(back, tracks)
+    assert back.id.tolist() == [least, -1, most]
+    assert not copy or back.id.flags.writeable
+
+
+def test_unsigned_integers_stay_positive_when_they_become_wider() -> None:
+    tracks = table_of(Tracks, 2, 7).replace(number=[255, 0])
+    assert decode(older_table(tracks, dtypes={"number": "|u1"}), Tracks).number.tolist() == [255, 0]
+
+
+def test_columns_are_added_and_widened_at_once_in_a_table_of_rows() -> None:
+    tracks = table_of(Tracks, 4, 8).replace(id=np.arange(4), hits=7, number=0, sources=0)
+    data = older_table(tracks, ("number", "sources"), {"id": "<i4", "hits": "<i2"})
+    assert same_bits(decode(data), tracks)
+
+
+@pytest.mark.parametrize(
+    ("without", "dtypes"),
+    [
+        (("state",), {}),
+        ((), {"time": "<f4"}),
+        ((), {"zone": "<i8"}),
+        ((), {"id": "<u4"}),
+        ((), {"number": "<i1"}),
+        ((), {"callsign": "<U4"}),
+        (("number", "runway", "zone", "simulated", "sources"), {}),
+        (("number", "runway", "zone"), {"id": "<i4", "hits": "<i2"}),
+    ],
+)
+def test_other_declarations_are_refused(without: tuple[str, ...], dtypes: dict[str, str]) -> None:
+    """No default, narrower reals or texts, wider integers, another sign, more than MOST_CHANGES."""
+    data = older_table(table_of(Tracks, 1, 9).replace(callsign="", id=1, zone=1, time=1.0), without, dtypes)
+    with pytest.raises(OtherColumnsError, match="Tracks: written with other columns than this version declares"):
+        decode(data)
+
+
+def test_an_older_table_that_is_cut_off_is_told_as_that() -> None:
+    data = older_table(table_of(Tracks, 2, 9), ("number",))
+    for octets, told in ((data[:-8], "cut off"), (data + bytes(8), "followed by more")):
+        with pytest.raises(CodecError, match=told) as caught:
+            decode(octets)
+        assert not isinstance(caught.value, OtherFormError)
+
+
+def test_a_table_that_is_not_known_is_of_another_form() -> None:
+    with pytest.raises(OtherFormError, match="Trucks"):
+        decode(encode(table_of(Tracks, 2, 4)).replace(b"Tracks", b"Trucks"))

@@ -14,6 +14,11 @@ from tests.pipeline.track.scene import T0, make_plots, split_scan
 AZIMUTHS = st.sampled_from([1, 7, 31, 32, 33, 45, 96, 100, 1000, 4096])
 
 
+def row_of(mark: int, azimuths: int) -> int:
+    """Marks stand at the last eighth of each 32nd of a turn."""
+    return (8 * mark + 7) * azimuths // 256
+
+
 @given(st.integers(-(10**6), 10**12), AZIMUTHS)
 def test_the_first_mark_at_or_after_a_row_is_the_first(row: int, azimuths: int) -> None:
     mark = first_mark(row, azimuths)
@@ -26,7 +31,7 @@ def test_every_turn_has_its_marks_at_the_same_rows(scan: int, azimuths: int) -> 
     assert marks.dtype == np.int64
     assert marks.tolist() == list(range(scan * MARKS_A_TURN, (scan + 1) * MARKS_A_TURN))
     rows = mark_row(marks, azimuths)
-    assert (rows - scan * azimuths).tolist() == [k * azimuths // MARKS_A_TURN for k in range(MARKS_A_TURN)]
+    assert (rows - scan * azimuths).tolist() == [row_of(k, azimuths) for k in range(MARKS_A_TURN)]
     assert mark_row(int(marks[-1]), azimuths) == rows[-1]
 
 
@@ -91,17 +96,17 @@ def test_a_mark_has_the_time_of_the_first_sweep_at_its_row_or_after_it(azimuths:
     told = {int(k): float(t) for mark, times in made for k, t in zip(mark, times, strict=True)}
     wanted = {}
     for k in range(5 * MARKS_A_TURN, 8 * MARKS_A_TURN):
-        after = np.flatnonzero(row >= k * azimuths // MARKS_A_TURN)
-        if not len(row) or not len(after) or k * azimuths // MARKS_A_TURN < row[0]:
+        after = np.flatnonzero(row >= row_of(k, azimuths))
+        if not len(row) or not len(after) or row_of(k, azimuths) < row[0]:
             continue
         at = int(after[0])
-        in_long_gap = at > 0 and row[at] - row[at - 1] - 1 > azimuths and k * azimuths // MARKS_A_TURN < row[at]
+        in_long_gap = at > 0 and row[at] - row[at - 1] - 1 > azimuths and row_of(k, azimuths) < row[at]
         if not in_long_gap:
             wanted[k] = float(time[at])
     assert told == wanted
 
 
-@pytest.mark.parametrize(("missing", "marks"), [(96, range(1, 34)), (97, range(34, 34))])
+@pytest.mark.parametrize(("missing", "marks"), [(96, range(1, 33)), (97, range(33, 33))])
 def test_marks_in_a_gap_longer_than_a_turn_are_left_out(missing: int, marks: range) -> None:
     row = np.array([missing + 3 - 96], np.int32)
     mark, time = passed_marks(96, row, np.array([7.5]), 3, 96)
@@ -110,7 +115,7 @@ def test_marks_in_a_gap_longer_than_a_turn_are_left_out(missing: int, marks: ran
 
 
 def test_a_mark_at_the_first_row_after_a_long_gap_is_not_in_the_gap() -> None:
-    mark, time = passed_marks(10 * 96, np.array([6, 7, 8, 9], np.int32), np.arange(4.0), 3, 96)
+    mark, time = passed_marks(10 * 96, np.array([8, 9, 10, 11], np.int32), np.arange(4.0), 3, 96)
     assert mark.tolist() == [322, 323]
     assert time.tolist() == [0.0, 3.0]
 
@@ -128,4 +133,4 @@ def test_the_scene_of_the_tracker_tests_gives_the_same_marks_for_any_cut(sectors
     whole, cut = (split_scan(plots, 3, count) for count in (1, sectors))
     assert octets([(one.mark, one.mark_time) for one in cut]) == octets([(one.mark, one.mark_time) for one in whole])
     assert whole[0].mark.tolist() == list(range(96, 128))
-    assert whole[0].mark_time.tolist() == [T0 + 3 + k / 32 for k in range(32)]
+    assert whole[0].mark_time.tolist() == [T0 + 3 + (8 * k + 7) / 256 for k in range(32)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -66,12 +67,15 @@ def line(east: float, north: float, v_east: float, v_north: float) -> Callable[[
     return lambda t: (east + v_east * t, north + v_north * t)
 
 
-def crossing(path: Callable[[float], tuple[float, float]], scan: int, site: RadarSite = RADAR) -> float:
-    """Time since T0 at which the beam of turn `scan` passes the target."""
-    t = scan + 0.5
+def crossing(
+    path: Callable[[float], tuple[float, float]], scan: int, site: RadarSite = RADAR, phase: float = 0.0
+) -> float:
+    """Time since T0 at which the beam of turn `scan` passes the target. phase: s since T0 at which turn 0 begins."""
+    period = site.video.period_s
+    t = phase + (scan + 0.5) * period
     for _ in range(6):
         e, n = path(t)
-        t = scan + (np.arctan2(e - site.east, n - site.north)) % (2 * np.pi) / (2 * np.pi)
+        t = phase + (scan + np.arctan2(e - site.east, n - site.north) % (2 * np.pi) / (2 * np.pi)) * period
     return float(t)
 
 
@@ -95,12 +99,15 @@ def make_plots(time: Any, position: Any, sd: float, site: RadarSite = RADAR, **c
 
 def scan_plots(
     rng: np.random.Generator, targets: Sequence[Target], scan: int, sd: float = 2.0, false: float = 0.0,
-    half: float = 3000.0, site: RadarSite = RADAR,
+    half: float = 3000.0, site: RadarSite = RADAR, phase: float = 0.0,
 ) -> Plots:  # fmt: skip
-    """All plots of one turn; random false ones, `false` on average, over a square of 2 `half`."""
+    """All plots of one turn; random false ones, `false` on average, over a square of 2 `half`.
+
+    phase: s since T0 at which turn 0 of this radar begins.
+    """
     time, place, length, width, bearing = [], [], [], [], []
     for one in targets:
-        t = crossing(one.path, scan, site)
+        t = crossing(one.path, scan, site, phase)
         seen = rng.random() < one.detection
         noise = rng.normal(0, sd, 2)
         if not seen or not one.born <= t < one.gone or any(a <= t < b for a, b in one.hidden):
@@ -116,33 +123,52 @@ def scan_plots(
             bearing.append(course % np.pi)
     for _ in range(rng.poisson(false)):
         e, n = rng.uniform(-half, half, 2)
-        time.append(T0 + crossing(lambda t, e=e, n=n: (e, n), scan, site))  # type: ignore[misc]
+        time.append(T0 + crossing(lambda t, e=e, n=n: (e, n), scan, site, phase))  # type: ignore[misc]
         place.append(np.array([e, n]))
         length.append(0.0)
         width.append(0.0)
         bearing.append(np.nan)
-    return make_plots(
+    plots = make_plots(
         np.array(time), np.array(place), sd, site, length=np.array(length), width=np.array(width),
         bearing=np.array(bearing), bearing_sd=0.1,
     )  # fmt: skip
+    # noise may carry a plot across north, into another turn than that of its time: such a one is not seen
+    turns = (plots.time - T0 - phase) / site.video.period_s - scan
+    return plots[np.abs(turns - plots.azimuth / (2 * np.pi)) < 0.5]
 
 
-def split_scan(plots: Plots, scan: int, sectors: int, site: RadarSite = RADAR, radar: int = 0) -> list[SectorPlots]:
-    """The same turn as equal sectors; a plot comes with the sector in which its centroid is closed, an azimuth mark
-    with the one that has its row."""
-    made = []
-    own = plots.azimuth % (2 * np.pi) / (2 * np.pi) * A
-    for k in range(sectors):
-        low, high = A * k // sectors, A * (k + 1) // sectors
-        inside = (own >= low) & (own < high)
-        mark = marks_between(scan * A + low, scan * A + high, A)
-        made.append(
-            SectorPlots(
-                radar, scan, T0 + scan + high / A, scan * A + low, scan * A + high, plots[inside],
-                mark=mark, mark_time=T0 + mark_row(mark, A) / A,
-            )
-        )  # fmt: skip
-    return made
+def row_time(row: Any, site: RadarSite = RADAR, phase: float = 0.0) -> Any:
+    """UTC s at which the antenna is at the absolute row: it turns evenly, turn 0 begins `phase` s after T0."""
+    return T0 + (phase + np.asarray(row) / site.video.azimuths * site.video.period_s)
+
+
+def marks(low: int, high: int, site: RadarSite = RADAR, phase: float = 0.0) -> dict[str, Any]:
+    """The columns of a block that tell which azimuth marks lie in its rows [low, high).
+
+    The time of a mark follows from its number alone, so that every cut of a turn into blocks tells the same bits.
+    """
+    number = marks_between(low, high, site.video.azimuths)
+    return {"mark": number, "mark_time": row_time(mark_row(number, site.video.azimuths), site, phase)}
+
+
+def block(
+    plots: Plots, scan: int, low: int, high: int, site: RadarSite = RADAR, radar: int = 0, phase: float = 0.0
+) -> SectorPlots:
+    """The block of turn `scan` between two of its rows, with those of the turn's plots whose centroid lies in it."""
+    a = site.video.azimuths
+    own = plots.azimuth % (2 * np.pi) / (2 * np.pi) * a
+    first, last = scan * a + low, scan * a + high
+    inside = plots[(own >= low) & (own < high)]
+    time = float(row_time(last, site, phase))
+    return SectorPlots(radar, scan, time, first, last, inside, **marks(first, last, site, phase))
+
+
+def split_scan(
+    plots: Plots, scan: int, sectors: int, site: RadarSite = RADAR, radar: int = 0, phase: float = 0.0
+) -> list[SectorPlots]:
+    """The same turn as equal sectors; a plot comes with the sector in which its centroid is closed."""
+    ends = [site.video.azimuths * k // sectors for k in range(sectors + 1)]
+    return [block(plots, scan, low, high, site, radar, phase) for low, high in pairwise(ends)]
 
 
 def make_tracker(nodes: Sequence[NodeSite] = (), radars: Sequence[RadarSite] = (RADAR,), **words: Any) -> Tracker:
@@ -169,3 +195,14 @@ def run(
 
 def truth_at(target: Target, time: Any) -> NDArray[np.float64]:
     return np.array([target.path(float(t) - T0) for t in np.atleast_1d(time)])
+
+
+def assert_same_store(one: dict[str, Any], other: dict[str, Any]) -> None:
+    """Two saved stores are alike to the last bit, all kinds of records."""
+    assert one.keys() == other.keys()
+    assert one["last_uid"] == other["last_uid"]
+    np.testing.assert_array_equal(one["time"], other["time"])
+    for kind in ("rows", "filter", "evidence", "look"):
+        assert one[kind].keys() == other[kind].keys()
+        for name, column in one[kind].items():
+            np.testing.assert_array_equal(column, other[kind][name], err_msg=f"{kind} {name}")

@@ -37,7 +37,7 @@ def seen_apart(metres: float, bearing: float, surface: SurfaceKind, apron_speed_
 def test_a_second_plot_is_the_same_target_when_its_speed_is_one_of_the_place(
     metres: float, surface: SurfaceKind, sd: float, same: bool, bearing: float
 ) -> None:
-    table = seen_apart(metres, bearing, surface, sd).save()["table"]
+    table = seen_apart(metres, bearing, surface, sd).save()["store"]["rows"]
     assert table["hits"].tolist() == ([2] if same else [1, 1])
 
 
@@ -47,5 +47,5 @@ def test_the_first_velocity_on_an_apron_is_drawn_towards_rest() -> None:
     for surface in (SurfaceKind.APRON, SurfaceKind.TAXIWAY):
         targets = [Target(line(500, -400, 0, 0), gone=1.0), Target(line(510, -400, 0, 0), born=1.0)]
         tracker = run(make_tracker(zones=FlatZones(surface)), targets, 2, sd=6.0)
-        speeds.append(float(np.hypot(*tracker.save()["table"]["state"][0, 2:])))
+        speeds.append(float(np.hypot(*tracker.save()["store"]["rows"]["state"][0, 2:])))
     assert speeds[0] < 0.7 * speeds[1]

@@ -130,6 +130,18 @@ def test_one_report_between_two_unnamed_tracks_waits_for_evidence() -> None:
     assert off(named, near) < 7
 
 
+def test_an_address_between_two_tracks_that_stay_alike_goes_to_one_of_them_with_the_fourth_report() -> None:
+    one, other = Target(line(500, 300, 0, 0), 5, 3), Target(line(500, 312, 0, 0), 5, 3)
+    middle = Target(line(500, 304.5, 0, 0))
+    tracker = run(make_tracker(), [one, other], 12, sd=0.5)
+    for k in range(4):
+        assert by_address(tracker.tracks(), "abc").id.tolist() == []
+        run(tracker, [one, other], 1, first=12 + k, sd=0.5)
+        tracker.target_reports(report(middle, 12.9 + k, "abc", accuracy=10.0))
+    assert len(by_address(tracker.tracks(), "abc")) == 1
+    assert tracker.counters["report_ambiguous"] == 3
+
+
 def test_an_identity_moves_when_reports_insist_and_not_before() -> None:
     far = Target(line(500, 700, 10, 0), 38, 30)
     tracker = both(make_tracker(), [TAXI, far], 12, lambda s: [report(TAXI, s + 0.5, "a")])
@@ -211,11 +223,11 @@ def test_an_older_report_is_taken_back_in_time() -> None:
 )
 def test_reports_that_cannot_be_taken_are_counted(words: dict[str, float], reason: str) -> None:
     tracker = run(make_tracker(), [TAXI], 8)
-    before = tracker.save()["table"]
+    before = tracker.save()["store"]["rows"]
     given = {"time": T0 + 8.0, "east": 0.0, "north": 0.0, "address": "a"} | words
     tracker.target_reports(TargetReports.build(1, **given))
     assert tracker.counters[reason] == 1
-    np.testing.assert_array_equal(tracker.save()["table"]["state"], before["state"])
+    np.testing.assert_array_equal(tracker.save()["store"]["rows"]["state"], before["state"])
 
 
 def event(t: float, kind: NodeEventKind = NodeEventKind.PASSAGE, **words: Any) -> NodeEvents:

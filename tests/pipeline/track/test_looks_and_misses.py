@@ -22,9 +22,14 @@ def seen_in(scans: list[int], total: int, tracker: Tracker) -> Tracker:
 
 
 def test_the_history_holds_hits_and_misses_in_the_order_of_the_looks() -> None:
-    table = seen_in([0, 1, 3, 4, 7], 9, make_tracker()).save()["table"]
-    assert [f"{int(one):b}" for one in table["history"]] == ["110110010"]
-    assert (table["looks"].tolist(), table["hits"].tolist(), table["misses"].tolist()) == ([9], [5], [1])
+    store = seen_in([0, 1, 3, 4, 7], 9, make_tracker()).save()["store"]
+    radar, node, report = (
+        {name: column[:, k].tolist() for name, column in store["evidence"].items()} for k in range(3)
+    )
+    assert [f"{one:b}" for one in radar["history"]] == ["110110010"]
+    assert (radar["looks"], store["rows"]["hits"].tolist(), radar["misses"]) == ([9], [5], [1])
+    for other in (node, report):
+        assert (other["history"], other["looks"], other["misses"], other["score"]) == ([0], [0], [0], [0.0])
 
 
 def test_what_is_seen_in_every_second_turn_is_not_four_of_six() -> None:

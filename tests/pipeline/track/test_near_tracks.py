@@ -9,12 +9,14 @@ import pytest
 
 from pipeline.associate.gnn import GlobalNearestNeighbour
 from pipeline.classify.extent_speed import ExtentSpeed
+from pipeline.contracts.measured import Measured
 from pipeline.filter.kalman import Kalman
 from pipeline.lifecycle.score import Score
 from pipeline.tables import Source, TargetCategory, TargetClass, TargetReports, TrackPhase
-from pipeline.track.core import Core, make_core, start_tracks
-from pipeline.track.maintenance import maintain_tracks
+from pipeline.track.core import Core, make_core
+from pipeline.track.maintenance import keep_house
 from pipeline.track.settings import TrackerSettings
+from pipeline.track.update import start_tracks, unknown_velocity
 from tests.pipeline.track.scene import RADAR, T0, FlatZones, Target, line, make_tracker, run, truth_at
 
 SURE = np.diag([1.0, 1.0, 0.25, 0.25])
@@ -33,47 +35,58 @@ def pair(
     )
     core.time = T0
     place = np.array([AT, AT + off])
-    start_tracks(core, np.full(2, T0), place, np.tile(np.eye(2), (2, 1, 1)), Source.RADAR, False)
-    table = core.table
-    table.phase[:2], table.score[:2], table.id[:2] = TrackPhase.CONFIRMED, 20.0, (1, 2)
-    table.velocity_unknown[:2], table.covariance[:2] = False, SURE
-    table.state[:2, 2:] = [(3.0, 4.0), np.add((3.0, 4.0), velocity)]
-    table.length[:2], table.width[:2] = 4.0, 2.0
-    table.born[:2] = T0 - 60.0, T0 - 50.0
-    table.radar_time[:2] = T0, T0 - 3.0
+    measured = Measured.of(np.full(2, T0), place, np.tile(np.eye(2), (2, 1, 1)))
+    start_tracks(core, measured, unknown_velocity(core, 2), 0, Source.RADAR, False)
+    store = core.store
+    store.phase[:2], store.evidence["score"][:2, 0], store.id[:2] = TrackPhase.CONFIRMED, 20.0, (1, 2)
+    store.filter["one_point"][:2] = False
+    state = np.column_stack([place, [(3.0, 4.0), np.add((3.0, 4.0), velocity)]])
+    store.length[:2], store.width[:2] = 4.0, 2.0
+    store.born[:2] = T0 - 60.0, T0 - 50.0
+    store.radar_time[:2] = T0, T0 - 3.0
     for row, words in enumerate((one, other)):
-        for name, value in words.items():
-            getattr(table, name)[row] = value
+        known(core, row, state[row], words.get("covariance", SURE))
+        for name in words.keys() - {"covariance"}:
+            getattr(store, name)[row] = words[name]
+        store.named[row] = store.address[row] != ""
     return core
+
+
+def known(core: Core, row: int, state: Any, covariance: Any) -> None:
+    """The filter holds this of the track."""
+    for records in (core.store.filter, core.store.rows):
+        records["state"][row], records["covariance"][row] = state, covariance
 
 
 def merged(core: Core, checks: int = 3) -> bool:
     """Whether the two are one after so many checks, between which nothing about them changes."""
     for _ in range(checks):
-        maintain_tracks(core)
-        for name in ("time", "updated", "radar_time"):
-            getattr(core.table, name)[: core.table.n] += 1.0
+        keep_house(core, core.time)
+        for name in ("updated", "radar_time"):
+            core.column(name)[:] += 1.0
+        core.store.time[: core.store.n] += 1.0
         core.time += 1.0
-    assert core.counters.get("merged", 0) == 2 - core.table.n
-    return core.table.n == 1
+    assert core.counters.get("merged", 0) == 2 - core.store.n
+    return core.store.n == 1
 
 
 def test_two_tracks_in_one_place_become_the_older_one_after_three_checks() -> None:
     core = pair((2.0, 0.0), {}, {})
     assert not merged(core, 2)
     assert merged(core, 1)
-    assert core.table.id[0] == 1
+    assert core.store.id[0] == 1
     core = pair((2.0, 0.0), {"born": T0 - 40.0}, {})
     assert merged(core)
-    assert core.table.id[0] == 2
+    assert core.store.id[0] == 2
 
 
 def test_checks_count_only_in_a_row() -> None:
     core = pair((2.0, 0.0), {}, {})
     assert not merged(core, 2)
-    core.table.state[1, 0] += 20.0
+    here = core.store.state[1].copy()
+    known(core, 1, here + 20.0 * np.eye(4)[0], SURE)
     assert not merged(core, 1)
-    core.table.state[1, 0] -= 20.0
+    known(core, 1, here, SURE)
     assert not merged(core, 2)
     assert merged(core, 1)
 
@@ -113,13 +126,14 @@ def test_two_sensors_may_follow_the_two_ends_of_a_long_target(long: int, distanc
     assert merged(pair((0.6 * distance, -0.8 * distance), *words)) == made_one
 
 
-@pytest.mark.parametrize(("off", "made_one"), [(55.0, True), (65.0, False)])
+@pytest.mark.parametrize(("off", "made_one"), [(145.0, True), (155.0, False)])
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("sense", [1, -1])
-def test_beyond_the_size_of_a_large_aircraft_they_stay_two(off: float, made_one: bool, axis: int, sense: int) -> None:
-    loose = {"covariance": np.diag([900.0, 900.0, 1.0, 1.0])}
+def test_beyond_what_a_late_report_may_be_off_they_stay_two(off: float, made_one: bool, axis: int, sense: int) -> None:
+    """150 m: a large aircraft, and a second of its final approach; both places are unsure by 80 m."""
+    one, other = ({"covariance": np.diag([6400.0, 6400.0, 1.0, 1.0])} for _ in range(2))
     east, north = sense * off * np.eye(2)[axis]
-    assert merged(pair((east, north), loose, loose)) == made_one
+    assert merged(pair((east, north), one, other)) == made_one
 
 
 @pytest.mark.parametrize(
@@ -141,11 +155,32 @@ def test_tracks_of_different_velocity_stay_two(
     ("one", "other", "made_one"), [("a", "b", False), ("a", "", True), ("", "b", True), ("", "", True)]
 )
 def test_tracks_of_two_addresses_stay_two(one: str, other: str, made_one: bool) -> None:
-    words = [{"address": name, "report_time": T0 if name else -np.inf} for name in (one, other)]
+    words = [{"address": name, "report_time": T0 if name else -np.inf, "plot_since": np.inf} for name in (one, other)]
     core = pair((2.0, 0.0), *words)
-    assert merged(core) == made_one
+    checks = 3 if bool(one) == bool(other) else core.settings.grouping.merge_named_after
+    assert not merged(core, checks - 1)
+    assert merged(core, 1) == made_one
     if made_one:
-        assert core.table.address[0] == one + other
+        assert core.store.address[0] == one + other
+
+
+def reported_and_not(speed: float, plot_since: float = np.inf) -> Core:
+    """Two tracks that move alike, eastward, of which the second bears an address. plot_since: of the second."""
+    core = pair((2.0, 0.0), {"plot_since": T0 - 60.0}, {"address": "a", "report_time": T0, "plot_since": plot_since})
+    for records in (core.store.filter, core.store.rows):
+        records["state"][:2, 2:] = speed, 0.0
+    return core
+
+
+@pytest.mark.parametrize(("together", "made_one"), [(2.5, True), (5.5, False)])
+def test_a_vehicle_that_the_radar_saw_beside_another_target_is_not_that_target(together: float, made_one: bool) -> None:
+    """Its last plot is 3 s old, and one second newer at each further check."""
+    assert merged(reported_and_not(9.0, T0 - 3.0 - together)) == made_one
+
+
+def test_a_report_and_an_echo_that_move_fast_and_alike_soon_become_one() -> None:
+    assert not merged(reported_and_not(7.5))
+    assert merged(reported_and_not(8.5))
 
 
 VEHICLE = {"claimed": TargetCategory.VEHICLE, "category": TargetClass.VEHICLE}

@@ -146,7 +146,7 @@ def test_a_track_begun_by_a_speed_is_fast_along_its_lane_only(heading: float) ->
         tracker.node_events(event(azimuth / (2 * np.pi) - 1.0, speed=30.0))
         for sector in split_scan(make_plots(T0 + azimuth / (2 * np.pi), [place], 1.0), 0, 4):
             tracker.sector(sector)
-        assert tracker.save()["table"]["hits"][0] == 1 + taken
+        assert tracker.save()["store"]["rows"]["hits"][0] == 1 + taken
 
 
 @pytest.mark.parametrize("heading", HEADINGS)
@@ -155,7 +155,7 @@ def test_a_track_begun_by_an_event_is_sure_along_its_lane_and_unsure_across(head
     along, right = lane_of(heading)
     tracker = make_tracker([node(heading)])
     tracker.node_events(event(0.0, speed=speed))
-    covariance = tracker.save()["table"]["covariance"][0]
+    covariance = tracker.save()["store"]["rows"]["covariance"][0]
     expected = 2.0**2 * np.outer(along, along) + 6.0**2 * np.outer(right, right)
     np.testing.assert_allclose(covariance[:2, :2], expected, atol=1e-9)
 
@@ -165,6 +165,8 @@ def test_a_speed_that_cannot_be_is_not_believed(speed: float) -> None:
     """The event counts as one without a speed: three plots are needed and not one."""
     tracker = make_tracker([node(0.7)])
     tracker.node_events(event(0.0, speed=speed))
-    table = tracker.save()["table"]
-    assert (table["velocity_unknown"].tolist(), table["looks"].tolist()) == ([True], [1])
-    assert table["covariance"][0, 2, 2] == table["covariance"][0, 3, 3] == 25.0**2
+    store = tracker.save()["store"]
+    assert store["filter"]["one_point"].tolist() == [True]
+    assert store["evidence"]["looks"].tolist() == [[0, 1, 0]]
+    covariance = store["rows"]["covariance"]
+    assert covariance[0, 2, 2] == covariance[0, 3, 3] == 25.0**2

@@ -15,6 +15,7 @@ from tests.pipeline.track.scene import (
     A,
     FlatZones,
     Target,
+    assert_same_store,
     line,
     make_plots,
     make_tracker,
@@ -113,9 +114,8 @@ def test_the_order_of_plots_does_not_matter() -> None:
                 order = np.random.default_rng(scan).permutation(len(sector.plots))
                 plots = sector.plots[order] if shuffle else sector.plots
                 tracker.sector(SectorPlots(0, scan, sector.time, sector.closed_from, sector.closed_to, plots))
-        saved.append(tracker.save()["table"])
-    for name, column in saved[0].items():
-        np.testing.assert_array_equal(column, saved[1][name], err_msg=name)
+        saved.append(tracker.save()["store"])
+    assert_same_store(*saved)
 
 
 def test_false_plots_alone_confirm_next_to_nothing() -> None:
@@ -321,8 +321,7 @@ def test_a_saved_tracker_goes_on_as_if_nothing_had_happened() -> None:
     for tracker in (first, second):
         run(tracker, MIXED, 8, first=12, false=5)
     a, b = first.save(), second.save()
-    for name, column in a["table"].items():
-        np.testing.assert_array_equal(column, b["table"][name], err_msg=name)
+    assert_same_store(a["store"], b["store"])
     assert first.counters == second.counters
     with pytest.raises(ValueError, match="fit"):
         make_tracker(radars=(RADAR, RADAR)).restore(a)

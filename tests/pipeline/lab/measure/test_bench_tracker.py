@@ -132,7 +132,7 @@ def test_sectors_are_the_turn_cut_up_and_the_same_seed_gives_the_same() -> None:
         assert [one.closed_from for one in pieces[1:]] == [one.closed_to for one in pieces[:-1]]
         assert pieces[-1].closed_to == (turn + 1) * 4096
         assert [one.mark.tolist() for one in pieces] == [[32 * turn + k] for k in range(32)]
-        assert [one.mark_time[0] for one in pieces] == [1.7e9 + turn + k / 32 for k in range(32)]
+        assert [one.mark_time[0] for one in pieces] == [1.7e9 + turn + (8 * k + 7) / 256 for k in range(32)]
 
 
 @pytest.mark.parametrize("count", [2, 7, 4096])

@@ -105,12 +105,14 @@ def test_recorded_positions_are_reported_once_a_second_unchanged_and_not_as_simu
     np.testing.assert_allclose(reports.course, math.pi / 2, atol=1e-6)
     assert not reports.simulated.any()
     assert set(reports.address.tolist()) == {"abc123"}
+    assert set(reports.source.tolist()) == {"traffic-record"}
 
 
 def test_vehicles_report_as_simulated_with_error() -> None:
     reports = ReportSimulator(1, missed=0.0).reports(0.0, 90.0, drive("CAR", simulated=True).at)
     assert reports.simulated.all()
     assert (reports.category == 2).all()
+    assert (reports.source == "beacons").all()
     error = np.concatenate([reports.east - 10 * reports.time, reports.north])
     assert error.std() == pytest.approx(2.5, rel=0.3)
 

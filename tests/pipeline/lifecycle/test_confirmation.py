@@ -3,11 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.classify.extent_speed import ExtentSpeed
 from pipeline.lifecycle.m_of_n import MOfN
 from pipeline.lifecycle.score import Score
-from pipeline.tables import TargetClass, TrackPhase
-from tests.pipeline.contracts.track import ClassifyContract, LifecycleContract
+from pipeline.tables import TrackPhase
+from tests.pipeline.contracts.lifecycle import LifecycleContract
 
 
 class TestMOfNContract(LifecycleContract):
@@ -26,6 +25,16 @@ class TestMOfNContract(LifecycleContract):
     )
     def test_m_of_n(self, history: int, looks: int, phase: TrackPhase, ended: bool) -> None:
         assert self.judge(history=history, looks=looks) == (phase, ended)
+
+    def test_hits_of_several_radars_do_not_add_up_but_those_of_reports_do(self) -> None:
+        halves = {"history": [0b11, 0b11, 0], "looks": [2, 2, 0]}
+        assert self.judge(2, **halves) == (TrackPhase.TENTATIVE, False)
+        assert self.judge(1, **halves) == (TrackPhase.CONFIRMED, False)
+
+    def test_what_one_radar_has_given_up_another_may_still_find(self) -> None:
+        lost, young = (0b1000, 4), (0b1, 1)
+        assert self.judge(2, history=[lost[0], young[0]], looks=[lost[1], young[1]]) == (TrackPhase.TENTATIVE, False)
+        assert self.judge(2, history=[lost[0], lost[0]], looks=[lost[1], lost[1]]) == (TrackPhase.TENTATIVE, True)
 
     def test_a_named_track_may_be_silent_for_longer(self) -> None:
         confirmed = {"phase": TrackPhase.CONFIRMED, "silence": 15.0, "looks": 40}
@@ -56,23 +65,21 @@ class TestScoreContract(LifecycleContract):
         assert self.judge(**confirmed, score=3.0)[1]
         assert not self.judge(**confirmed, score=3.0, identified=True)[1]
 
+    def test_scores_of_sensors_that_speak_for_it_add_up(self) -> None:
+        seen = {"history": [0b11, 0b1], "looks": [2, 1]}
+        assert self.judge(2, **seen, score=[7.0, 6.0]) == (TrackPhase.CONFIRMED, False)
+        assert self.judge(2, **seen, score=[11.0, -6.0]) == (TrackPhase.TENTATIVE, False)
+        assert self.judge(2, **seen, score=[-6.0, -4.0]) == (TrackPhase.TENTATIVE, False)
+        assert self.judge(2, **seen, score=[-6.0, -5.5]) == (TrackPhase.TENTATIVE, True)
 
-class TestExtentSpeedContract(ClassifyContract):
-    part = ExtentSpeed()
-
-    @pytest.mark.parametrize("before", list(TargetClass))
-    def test_between_the_bounds_it_stays_what_it_was(self, before: TargetClass) -> None:
-        assert self.call(before, 15.0, 5.0) == before
-
-    def test_no_car_is_that_fast(self) -> None:
-        assert self.call(TargetClass.VEHICLE, 8.0, 60.0, seen=1) == TargetClass.AIRCRAFT
-
-    def test_the_extent_has_to_settle(self) -> None:
-        assert self.call(0, 40.0, 5.0, seen=2) == TargetClass.UNKNOWN
+    def test_undecided_for_too_long_is_so_for_every_radar_that_has_seen_it(self) -> None:
+        seen = {"history": [0b1010101, 0b1], "score": [5.0, 4.0]}
+        assert self.judge(2, **seen, looks=[15, 3]) == (TrackPhase.TENTATIVE, False)
+        assert self.judge(2, **seen, looks=[15, 15]) == (TrackPhase.TENTATIVE, True)
 
 
 @pytest.mark.parametrize(
-    "words", [{"m": 7, "n": 6}, {"n": 40}, {"coast_after": 9}, {"delete_silence": 1.0}, {"start_speed_sd": 0.0}]
+    "words", [{"m": 7, "n": 6}, {"n": 40}, {"coast_after": 9}, {"delete_silence": 1.0}, {"max_position_sd": 0.0}]
 )
 def test_lifecycle_settings_out_of_bounds(words: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="must"):
@@ -83,9 +90,3 @@ def test_lifecycle_settings_out_of_bounds(words: dict[str, float]) -> None:
 def test_score_settings_out_of_bounds(words: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="must"):
         Score(**words)
-
-
-@pytest.mark.parametrize("words", [{"vehicle_length": 20.0}, {"vehicle_speed": 50.0}])
-def test_classify_settings_out_of_bounds(words: dict[str, float]) -> None:
-    with pytest.raises(ValueError, match="must"):
-        ExtentSpeed(**words)
