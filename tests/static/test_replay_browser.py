@@ -100,18 +100,18 @@ def test_play_and_pause_by_button_and_by_key(screen: Screen, replay: FakeReplay)
     play.click()
     until(lambda: replay.state().playing, "it plays")
     screen.until(f"airside.time() > {BEGIN + 60.5}")
-    assert play.get_attribute("aria-label") == "Pause"
+    until(lambda: play.get_attribute("aria-label") == "Pause", "the button offers the pause")
     screen.page.locator("#stage").focus()
     screen.page.keyboard.press(" ")
     until(lambda: not replay.state().playing, "it is paused")
     stopped = replay.state().time
     screen.until(f"Math.abs(airside.time() - {stopped}) < 0.001")
-    assert "paused" in text(screen, ".plate")
-    assert text(screen, "#data-age") == "paused"
+    until(lambda: "paused" in text(screen, ".plate"), "the plate says so")
+    until(lambda: text(screen, "#data-age") == "paused", "the age of the data says so")
     screen.page.keyboard.press("]")
     screen.page.locator("#replay-speed button", has_text="8×").click()
     until(lambda: replay.state().speed == 8.0, "the pace is chosen")
-    assert screen.page.locator("#replay-speed button[aria-pressed=true]").inner_text() == "8×"
+    until(lambda: screen.page.locator("#replay-speed button[aria-pressed=true]").inner_text() == "8×", "it is shown")
     assert screen.errors == []
 
 
