@@ -23,8 +23,6 @@ FIRST_SCORE = 0.5
 """Fraction of `other_sensor` that a track begun by a node event or a report has for each hit counted beforehand, so
 that it takes a second measurement to confirm it."""
 
-NO_RADAR = -1
-
 
 def node_sensor(core: Core) -> int:
     """The column of the evidence of nodes."""
