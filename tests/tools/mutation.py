@@ -5,24 +5,37 @@
 takes a seeded sample of single mutations of pipeline/track, filter, associate, lifecycle and group, tries each in a
 copy of the project, and says which were killed and which survived. A survivor is a hole in the tests, or does the same
 as the original: those are set aside by name, with the reason, in tests/tools/equivalent_mutants.toml.
+
+To compile the kernels anew for each mutant would take most of the time, so it is tried in two rounds. Before them, the
+tests run on unchanged sources: all must pass with the compiler (numba); those that also pass without it within a
+second are the quick ones. First round: the quick tests, without the compiler, those of the mutant's source first, then
+those of its room, then the others, the shortest first. Second round, only for what survives the first: the remaining
+tests and again those of the mutant's source, with the compiler.
+
+A mutant is killed when a test fails that passes in the same way on unchanged sources, and also when its sources cannot
+be imported or the process crashes. Where only time ran out it is "timed out", which does not count as killed. Without
+the compiler an index beyond an array raises an error; with it, such a mutant may read some other number and survive.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import queue
 import sys
 import tempfile
+import time
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
 from app.output_files import check_writable
 from tests.tools.mutants import Mutant, mutants, shuffled
-from tests.tools.mutation_trees import Outcome, Tree, TreeError
+from tests.tools.mutation_trees import RAN_AWAY, SURVIVED, Outcome, Tree, TreeError, Unchanged
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -36,9 +49,6 @@ EQUIVALENT = Path(__file__).with_name("equivalent_mutants.toml")
 
 FIRST_LIMIT_S = 1800.0
 """For the tests of the unchanged sources, with all kernels to compile."""
-
-LIMIT_FACTOR, COMPILING_S = 5.0, 120.0
-"""A mutant may take so many times as long as the unchanged sources, and so many seconds more to compile."""
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -109,11 +119,17 @@ def files_of_tests(root: Path = ROOT) -> list[str]:
     return [path.relative_to(root).as_posix() for path in found if path.is_file()]
 
 
-def tests_for(mutant: Mutant, files: Sequence[str]) -> list[str]:
-    """The test file named after the mutant's source, then those of its room, then all others."""
+def tests_for(mutant: Mutant, files: Sequence[str], seconds: Mapping[str, float]) -> list[str]:
+    """The test file named after the mutant's source, then those of its room, then all others, each the shortest first.
+
+    seconds: of tests, by pytest's names of them.
+    """
     source = Path(mutant.path)
     room = f"tests/{source.parent.as_posix()}/"
-    return sorted(files, key=lambda one: (one != f"{room}test_{source.name}", not one.startswith(room)))
+    took = defaultdict[str, float](float)
+    for test, one in seconds.items():
+        took[test.partition("::")[0]] += one
+    return sorted(files, key=lambda one: (one != f"{room}test_{source.name}", not one.startswith(room), took[one]))
 
 
 def _tests_in(folder: Path) -> list[Path]:
@@ -128,9 +144,7 @@ def try_all(chosen: Sequence[Mutant], jobs: int, deselected: Sequence[str] = ())
     with tempfile.TemporaryDirectory(prefix="airside-mutation-") as folder, ThreadPoolExecutor(jobs) as pool:
         files = files_of_tests()
         trees = [Tree(ROOT, Path(folder).resolve() / str(k), deselected) for k in range(jobs)]
-        took = max(pool.map(lambda tree: tree.prove(files, FIRST_LIMIT_S), trees))
-        limit = COMPILING_S + LIMIT_FACTOR * took
-        print(f"unchanged, the tests pass in {took:.0f} s; a mutant may take {limit:.0f} s", flush=True)
+        unchanged = _prove(trees, files, pool)
         free = queue.SimpleQueue[Tree]()
         for tree in trees:
             free.put(tree)
@@ -138,7 +152,7 @@ def try_all(chosen: Sequence[Mutant], jobs: int, deselected: Sequence[str] = ())
         def attempt(mutant: Mutant) -> Outcome:
             tree = free.get()
             try:
-                return tree.attempt(mutant, tests_for(mutant, files), limit)
+                return tree.attempt(mutant, tests_for(mutant, files, unchanged.quick), unchanged)
             finally:
                 free.put(tree)
 
@@ -154,6 +168,24 @@ def try_all(chosen: Sequence[Mutant], jobs: int, deselected: Sequence[str] = ())
     return [outcomes[k] for k in range(len(chosen))]
 
 
+def _prove(trees: Sequence[Tree], files: Sequence[str], pool: ThreadPoolExecutor) -> Unchanged:
+    """Run the tests on unchanged sources, with the compiler and without it, side by side where there are two copies."""
+    begun = time.monotonic()
+    trees[0].take_kernels(ROOT, Path(os.environ["NUMBA_CACHE_DIR"]).parent)  # set when app was imported
+    every = pool.submit(trees[0].with_compiler, files, FIRST_LIMIT_S)
+    quick = pool.submit(trees[-1].without_compiler, files, FIRST_LIMIT_S)
+    unchanged = Unchanged(quick=quick.result(), every=every.result())
+    for tree in trees[1:]:
+        trees[0].give_kernels(tree)
+    print(
+        f"unchanged, {len(unchanged.every):,} tests pass in {sum(unchanged.every.values()):.0f} s with the compiler, "
+        f"{len(unchanged.quick):,} are quick without it, {sum(unchanged.quick.values()):.0f} s "
+        f"({time.monotonic() - begun:.0f} s)",
+        flush=True,
+    )
+    return unchanged
+
+
 def document(outcomes: Sequence[Outcome], seed: int) -> dict[str, Any]:
     """What became of them, as JSON has it."""
     killed = sum(one.killed for one in outcomes)
@@ -161,6 +193,7 @@ def document(outcomes: Sequence[Outcome], seed: int) -> dict[str, Any]:
         "seed": seed,
         "sample": len(outcomes),
         "killed": killed,
+        "timed_out": sum(one.verdict == RAN_AWAY for one in outcomes),
         "share": killed / len(outcomes),
         "rows": [
             {
@@ -170,6 +203,7 @@ def document(outcomes: Sequence[Outcome], seed: int) -> dict[str, Any]:
                 "before": one.mutant.before,
                 "after": one.mutant.after,
                 "killed": one.killed,
+                "verdict": one.verdict,
                 "by": one.by,
                 "seconds": round(one.seconds, 1),
             }
@@ -179,7 +213,7 @@ def document(outcomes: Sequence[Outcome], seed: int) -> dict[str, Any]:
 
 
 def _line(one: Outcome) -> str:
-    what = f"killed by {one.by}" if one.killed else "SURVIVED"
+    what = "SURVIVED" if one.verdict == SURVIVED else f"{one.verdict} by {one.by}"
     return f"{one.mutant.path}:{one.mutant.line} {_change(one.mutant)}: {what} ({one.seconds:.0f} s)"
 
 
@@ -188,9 +222,10 @@ def _change(mutant: Mutant) -> str:
 
 
 def _summary(outcomes: Sequence[Outcome], found: dict[str, Any]) -> list[str]:
-    survived = [one.mutant for one in outcomes if not one.killed]
-    lines = ["", *(f"survived: {one.name} (line {one.line})" for one in survived)]
-    return [*lines, f"{found['killed']} of {found['sample']} killed, {found['share']:.1%}"]
+    left = [one for one in outcomes if not one.killed]
+    lines = ["", *(f"{one.verdict}: {one.mutant.name} (line {one.mutant.line})" for one in left)]
+    late = f", {found['timed_out']} timed out" if found["timed_out"] else ""
+    return [*lines, f"{found['killed']} of {found['sample']} killed, {found['share']:.1%}{late}"]
 
 
 def _parser() -> argparse.ArgumentParser:
