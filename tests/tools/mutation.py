@@ -7,10 +7,10 @@ copy of the project, and says which were killed and which survived. A survivor i
 as the original: those are set aside by name, with the reason, in tests/tools/equivalent_mutants.toml.
 
 To compile the kernels anew for each mutant would take most of the time, so it is tried in two rounds. Before them, the
-tests run on unchanged sources: all must pass with the compiler (numba); those that also pass without it within a
-second are the quick ones. First round: the quick tests, without the compiler, those of the mutant's source first, then
-those of its room, then the others, the shortest first. Second round, only for what survives the first: the remaining
-tests and again those of the mutant's source, with the compiler.
+tests run on unchanged sources: all must pass with the compiler (numba); those that also pass without it, within a
+second of processor time, are the quick ones. First round: the quick tests, without the compiler, those of the mutant's
+source first, then those of its room, then the others, the shortest first. Second round, only for what survives the
+first: the remaining tests and again those of the mutant's source, with the compiler.
 
 A mutant is killed when a test fails that passes in the same way on unchanged sources, and also when its sources cannot
 be imported or the process crashes. Where only time ran out it is "timed out", which does not count as killed. Without
@@ -48,16 +48,17 @@ TESTS = (*(f"tests/pipeline/{room}" for room in ROOMS), "tests/pipeline/test_eng
 EQUIVALENT = Path(__file__).with_name("equivalent_mutants.toml")
 
 FIRST_LIMIT_S = 1800.0
-"""For the tests of the unchanged sources, with all kernels to compile."""
+"""Processor time for the tests of the unchanged sources, with all kernels to compile."""
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command; 0, 1 when fewer were killed than --least wants, 2 when it cannot be done, 130 when stopped."""
     options = _parser().parse_args(words)
     try:
-        every = all_mutants(options.rooms)
+        whole = all_mutants()
+        every = [one for one in whole if Path(one.path).parts[1] in options.rooms]
         aside = equivalents(EQUIVALENT)
-        for name in gone(aside):
+        for name in gone(aside, whole):
             print(f"set aside, but not there any more: {name}", file=sys.stderr)
         chosen = sample(every, aside, options.seed, options.sample, options.only)
         if options.list:
@@ -82,9 +83,9 @@ def main(words: Sequence[str] | None = None) -> int:
     return int(found["share"] < options.least)
 
 
-def all_mutants(rooms: Iterable[str] = ROOMS, root: Path = ROOT) -> list[Mutant]:
-    """Every mutation of these rooms."""
-    files = [path for room in rooms for path in sorted((root / "pipeline" / room).rglob("*.py"))]
+def all_mutants(root: Path = ROOT) -> list[Mutant]:
+    """Every mutation of ROOMS."""
+    files = [path for room in ROOMS for path in sorted((root / "pipeline" / room).rglob("*.py"))]
     return [one for path in files for one in mutants(path.relative_to(root).as_posix(), path.read_bytes())]
 
 
@@ -97,11 +98,10 @@ def equivalents(path: Path) -> dict[str, str]:
     return {one["name"]: one["reason"] for one in listed}
 
 
-def gone(aside: Iterable[str], root: Path = ROOT) -> list[str]:
+def gone(aside: Iterable[str], every: Iterable[Mutant]) -> list[str]:
     """Names set aside that no mutation bears any more: what they spoke of has changed, and so may the reason have."""
-    listed = list(aside)
-    there = {one.name for one in all_mutants(root=root)} if listed else set()
-    return [name for name in listed if name not in there]
+    there = {one.name for one in every}
+    return [name for name in aside if name not in there]
 
 
 def sample(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import resource
@@ -28,15 +29,18 @@ MOST_MEMORY = 8 * 2**30
 """Octets of address space for the tests of a mutant; a loop that allocates must not take the machine with it."""
 
 QUICK_S = 1.0
-"""A test that takes longer than so many seconds without the compiler is left to the round with it."""
+"""A test that takes more processor time without the compiler, s, is left to the round with it."""
 
 LATE_S, LATE_TESTS = 20.0, 2
-"""Without the compiler, a mutant runs away when so many quick tests each take longer than so many seconds: at least
-twenty times what they take unchanged, which is more than a busy host explains."""
+"""Without the compiler, a mutant runs away when so many quick tests each take more processor time, s: at least twenty
+times what they take unchanged."""
 
 STARTING_S, COMPILING_S, LIMIT_FACTOR = 60.0, 120.0, 4.0
-"""A mutant's tests may take so many times as long as on unchanged sources, and so many seconds more to start without
-the compiler or to compile with it."""
+"""A mutant's tests may take so many times the processor time that they take on unchanged sources, and so many seconds
+more to start without the compiler or to compile with it."""
+
+CLOCK_FACTOR = 10.0
+"""Time on the clock that a process may take, over the processor time that it may take: others may use the host too."""
 
 ALL_PASSED, SOME_FAILED = 0, 1
 """What pytest answers."""
@@ -142,7 +146,8 @@ class Tree:
         run = self._tests(files, limit, each=QUICK_S)
         if run.code not in (ALL_PASSED, SOME_FAILED):
             raise TreeError(f"the tests without the compiler came to no end ({run.code}):\n{run.output[-3000:]}")
-        return {test: seconds for test, (result, seconds) in run.results.items() if result == PASSED}
+        passed = {test: seconds for test, (result, seconds) in run.results.items() if result == PASSED}
+        return {test: seconds for test, seconds in passed.items() if seconds <= QUICK_S}
 
     def with_compiler(self, files: Sequence[str], limit: float) -> dict[str, float]:
         """All tests and what they take, s, on unchanged sources with the compiler. Raises TreeError if any fails."""
@@ -252,7 +257,7 @@ class Tree:
         return _Run(code, {one["test"]: (one["result"], one["seconds"]) for one in lines}, output)
 
     def _python(self, words: Sequence[str], more: Mapping[str, str], limit: float) -> tuple[int | None, str]:
-        """Run Python in the copy; its exit code (None past the limit, s) and what it printed."""
+        """Run Python in the copy; its exit code (None past the limit, s of processor time) and what it printed."""
         own = {
             "HYPOTHESIS_STORAGE_DIRECTORY": str(self._spare / "hypothesis"),
             **{f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")},
@@ -264,11 +269,12 @@ class Tree:
         )  # fmt: skip
         try:
             resource.prlimit(process.pid, resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
-            output, _ = process.communicate(timeout=limit)
+            resource.prlimit(process.pid, resource.RLIMIT_CPU, (math.ceil(limit), math.ceil(limit) + 1))
+            output, _ = process.communicate(timeout=CLOCK_FACTOR * limit)
         except subprocess.TimeoutExpired:
             return None, ""
         finally:
             if process.poll() is None:
                 os.killpg(process.pid, signal.SIGKILL)  # a session of its own, with all that the tests started
                 process.communicate()
-        return process.returncode, output
+        return None if process.returncode == -signal.SIGXCPU else process.returncode, output
