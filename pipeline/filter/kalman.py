@@ -294,11 +294,13 @@ def _update(
             if last - first > 1 and at < newest:
                 _move(x, p, newest - at, noise, moved_x, moved_p)
                 x[:], p[:] = moved_x, moved_p
-            _add_to_mixture(mean, cov, x, p, math.exp(log_weight[h]))
-        for i in range(4):
-            for j in range(4):
-                cov[i, j] -= mean[i] * mean[j]
-        if last - first == 1:
+            if last - first > 1:
+                _add_to_mixture(mean, cov, x, p, math.exp(log_weight[h]))
+        if last - first > 1:
+            for i in range(4):
+                for j in range(4):
+                    cov[i, j] -= mean[i] * mean[j]
+        else:
             mean[:], cov[:] = x, p
         row["state"][:], row["covariance"][:] = mean, cov
         out_mean[k], out_cov[k] = mean, cov

@@ -54,10 +54,12 @@ class Fading:
 @inlined
 def hits_within(history: int, looks: int) -> int:
     """How many of the newest `looks` (at most 32) bits are set."""
-    made = 0
-    for bit in range(looks):
-        made += (int(history) >> bit) & 1
-    return made
+    # the number of bits, added up in parallel within pairs, fours and bytes of the word
+    bits = int(history) & ((1 << looks) - 1)
+    bits -= (bits >> 1) & 0x55555555
+    bits = (bits & 0x33333333) + ((bits >> 2) & 0x33333333)
+    bits = (bits + (bits >> 4)) & 0x0F0F0F0F
+    return ((bits * 0x01010101) >> 24) & 0xFF
 
 
 @allocating
