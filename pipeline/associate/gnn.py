@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.contracts.associate import Association, Expected
 from pipeline.contracts.measured import Hypotheses, Measured
 from pipeline.kernels.assignment import assign_sparse
+from pipeline.kernels.cells import sort_into_cells, span
 from pipeline.kernels.compiled import allocating
 from pipeline.tables.arrays import Array, Floats
 
@@ -71,6 +72,12 @@ class GlobalNearestNeighbour:
         hypotheses = Hypotheses(np.arange(n + 1, dtype=np.int32), plot_first, plot[:taken], np.zeros(n))
         return Association(hypotheses, first, pair[:pairs], cost[:pairs], squared[:pairs], NONE_ENDED)
 
+    def reach(self, expected: Expected, measured: Measured) -> Floats:
+        """(n,) m that the gate of each track reaches at most. See `AssociatePart`."""
+        made = np.empty(len(expected.time))
+        _reach(expected.covariance, expected.extent, measured.noise, self.gate, self.max_gate_m, self.extent_sd, made)
+        return made
+
 
 PART = GlobalNearestNeighbour
 
@@ -78,11 +85,6 @@ NONE_ENDED = np.zeros(0, np.int32)
 
 CELLS_PER_GATE = 3
 """Cells of the search grid across half a gate: fewer compare pairs that are too far apart, more visit empty cells."""
-
-CELLS_PER_PLOT, LEAST_CELLS = 4, 64
-"""Of the search grid at most for each measurement, and for all, so that one stray measurement does not make it
-large."""
-
 
 PAIRS_PER_TRACK = 4
 """Room for pairs at first; where more lie in the gates, it is asked for again."""
@@ -99,7 +101,7 @@ def _associate(
     n = len(tracks)
     if n == 0 or len(plots) == 0:
         return 0, 0
-    start, order, grid = _grid(m_position, plots, max_gate / CELLS_PER_GATE)
+    start, order, grid = sort_into_cells(m_position, plots, max_gate / CELLS_PER_GATE)
     widest = 0.0
     for j in plots:
         widest = max(widest, m_noise[j, 0, 0] + m_noise[j, 1, 1])
@@ -132,29 +134,15 @@ def _associate(
 
 
 @allocating
-def _grid(position: Floats, plots: Array, cell: float) -> tuple[Array, Array, Floats]:
-    """Measurements sorted into square cells: first row of each cell, the rows, (west, south, cell, columns, rows)."""
-    m = len(plots)
-    west, east, south, north = np.inf, -np.inf, np.inf, -np.inf
-    for j in plots:
-        west, east = min(west, position[j, 0]), max(east, position[j, 0])
-        south, north = min(south, position[j, 1]), max(north, position[j, 1])
-    most = max(CELLS_PER_PLOT * m, LEAST_CELLS)
-    wide, high = max(east - west, 1.0), max(north - south, 1.0)
-    cell = max(cell, math.sqrt(wide * high / most), wide / most, high / most)
-    nx, ny = int(wide / cell) + 1, int(high / cell) + 1
-    start, order, where = np.zeros(nx * ny + 1, np.int32), np.empty(m, np.int32), np.empty(m, np.int32)
-    for o in range(m):
-        j = plots[o]
-        where[o] = int((position[j, 1] - south) / cell) * nx + int((position[j, 0] - west) / cell)
-        start[where[o] + 1] += 1
-    for c in range(1, len(start)):
-        start[c] += start[c - 1]
-    filled = start.copy()
-    for o in range(m):
-        order[filled[where[o]]] = plots[o]
-        filled[where[o]] += 1
-    return start, order, np.array([west, south, cell, float(nx), float(ny)])
+def _reach(
+    cov: Floats, extent: Floats, m_noise: Floats, gate: float, max_gate: float, extent_sd: float, out: Floats
+) -> None:
+    widest = 0.0
+    for j in range(len(m_noise)):
+        widest = max(widest, m_noise[j, 0, 0] + m_noise[j, 1, 1])
+    for i in range(len(out)):
+        spread = extent_sd * extent_sd * (extent[i, 0] * extent[i, 0] + extent[i, 1] * extent[i, 1])
+        out[i] = min(math.sqrt(gate * (cov[i, 0, 0] + cov[i, 1, 1] + spread + widest)), max_gate)
 
 
 @allocating
@@ -173,8 +161,8 @@ def _gate_track(
     a11 = p[1, 1] + along * ce * ce + across * se * se
     reach = min(math.sqrt(gate * (a00 + a11 + widest)), max_gate)
     reach += window[i] * math.sqrt(x[2] * x[2] + x[3] * x[3])
-    x_from, x_to = _span(x[0] - reach - west, x[0] + reach - west, cell, nx)
-    y_from, y_to = _span(x[1] - reach - south, x[1] + reach - south, cell, ny)
+    x_from, x_to = span(x[0] - reach - west, x[0] + reach - west, cell, nx)
+    y_from, y_to = span(x[1] - reach - south, x[1] + reach - south, cell, ny)
     k = 0
     for cy in range(y_from, y_to):
         for o in range(start[cy * nx + x_from], start[cy * nx + x_to] if x_to > x_from else 0):
@@ -194,11 +182,3 @@ def _gate_track(
                     pair[k], squared[k], cost[k] = j, d2, d2 + math.log(det)
                 k += 1
     return k
-
-
-@allocating
-def _span(low: float, high: float, cell: float, cells: int) -> tuple[int, int]:
-    """Cells [from, to) that an interval touches."""
-    if high < 0.0 or low > cells * cell:
-        return 0, 0
-    return max(int(low / cell), 0) if low > 0.0 else 0, min(int(high / cell) + 1, cells)

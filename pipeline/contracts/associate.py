@@ -65,5 +65,12 @@ class AssociatePart(Protocol):
     def branching(self) -> bool:
         """Whether several hypotheses of a track become several rows."""
 
+    def reach(self, expected: Expected, measured: Measured) -> Floats:
+        """(n,) m; no measurement farther from where a track is expected at its time can lie in the gate of the track.
+
+        What is connected by no such distance is decided apart: the answer for some tracks and measurements is the same
+        whether others out of reach of all of them are asked for together with them or not.
+        """
+
     def __call__(self, expected: Expected, measured: Measured, tracks: Array, plots: Array) -> Association:
         """Decide among the rows `tracks` of expected and `plots` of measured (int arrays)."""

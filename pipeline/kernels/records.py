@@ -28,26 +28,12 @@ def take(records: Array, rows: Array) -> Array:
     if rows.dtype == np.bool_:
         rows = np.flatnonzero(rows)
     made = np.empty(len(rows), records.dtype)
-    _take(records, rows, made)
-    return made
-
-
-def joined(first: Array, second: Array) -> Array:
-    """The records of both, one after the other."""
-    made = np.empty(len(first) + len(second), first.dtype)
-    _join(first, second, made)
+    take_records(records, rows, made)
     return made
 
 
 @allocating
-def _take(records: Array, rows: Array, out: Array) -> None:
+def take_records(records: Array, rows: Array, out: Array) -> None:
+    """Copy the records of rows (k,) to the first k of `out`."""
     for k in range(len(rows)):
         out[k] = records[rows[k]]
-
-
-@allocating
-def _join(first: Array, second: Array, out: Array) -> None:
-    for k in range(len(first)):
-        out[k] = first[k]
-    for k in range(len(second)):
-        out[len(first) + k] = second[k]

@@ -11,12 +11,13 @@ from pipeline.tables.arrays import Array
 Numbers = TypeVar("Numbers", int, Array)
 """One whole number or an int64 array of them."""
 
-MARKS_A_TURN = 32
-"""Marks in one turn of the antenna. What waits for the next mark waits for a 32nd of a turn at most: 31 ms at one turn
-a second, little beside the time the extractor needs to complete a plot. More marks cost more decisions a turn."""
+MARKS_A_TURN = 16
+"""Marks in one turn of the antenna. What waits for the next mark waits for a 16th of a turn at most: 62 ms at one turn
+a second, on average half of that, little beside the time the extractor needs to complete a plot. Each mark is a
+decision of its own: with 32 of them a turn costs half as much again."""
 
-PLACES, PLACE = 8, 7
-"""A mark stands at the last of so many places of its 32nd of a turn, counted from 0: just before the end of the block
+PLACES, PLACE = 16, 15
+"""A mark stands at the last of so many places of its 16th of a turn, counted from 0: just before the end of the block
 where a radar delivers 32 a turn, so that it is decided with that block and not with the next."""
 
 

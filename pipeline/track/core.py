@@ -20,7 +20,7 @@ from pipeline.tables.arrays import Array, Floats
 from pipeline.track.false_plots import FalsePlots
 from pipeline.track.latency import CORROBORATED_S, Latencies, with_latency
 from pipeline.track.numbers import LAST_ASTERIX_NUMBER, TrackNumbers
-from pipeline.track.plot_pool import EMPTY
+from pipeline.track.plot_pool import PlotPool
 from pipeline.track.radar_clock import RadarClock
 from pipeline.track.settings import LARGEST_CAPACITY, TrackerSettings
 from pipeline.track.shape import fill_track_extent
@@ -55,8 +55,8 @@ class ZoneLookup(Protocol):
 class Core:
     """The whole state of a tracker and what it works with.
 
-    azimuths: rows a turn of each radar. pools: plots of each radar not decided on yet, records of `plot_pool.POOL` in
-    order of row. false_plots: where each radar makes false plots. undecided: address -> (target of the best track,
+    azimuths: rows a turn of each radar. pools: plots of each radar not decided on yet. false_plots: where each radar
+    makes false plots. undecided: address -> (target of the best track,
     reports in a row that chose it). latencies: of the sources of reports. reports_taken: so far. time: newest time
     taken, UTC s. began: UTC s of the first sector. judged_time, maintenance_time: UTC s at which all tracks were last
     judged, and the search for duplicates was last run.
@@ -73,7 +73,7 @@ class Core:
     store: TrackStore
     numbers: TrackNumbers
     clocks: list[RadarClock]
-    pools: list[Array]
+    pools: list[PlotPool]
     false_plots: list[FalsePlots]
     counters: dict[str, int]
     azimuths: tuple[int, ...]
@@ -124,10 +124,12 @@ class Core:
     ) -> Expected:
         """Rows (k,) as an association sees them. window: (k,) s about `time`. latency_sd: s, of what is measured."""
         n = len(rows)
-        unsure = self.unsure_latency(rows, time)
-        if latency_sd > 0.0:
-            unsure = np.hypot(unsure, latency_sd)
-        covariance = with_latency(moments.mean, moments.covariance, unsure)
+        covariance = moments.covariance
+        if self.reports_taken:
+            unsure = self.unsure_latency(rows, time)
+            if latency_sd > 0.0:
+                unsure = np.hypot(unsure, latency_sd)
+            covariance = with_latency(moments.mean, covariance, unsure)
         made = Expected(
             time, moments.mean, covariance, window, np.empty((n, 3)), np.empty(n), np.empty(n, np.int64),
             np.empty(n),
@@ -207,7 +209,7 @@ def shift_times(core: Core, seconds: float) -> None:
     for clock in core.clocks:
         clock.shift(seconds)
     for pool in core.pools:
-        pool["time"] += seconds
+        pool.records["time"] += seconds
     core.numbers.free_at += seconds
     core.time += seconds
     core.began += seconds
@@ -234,7 +236,7 @@ def make_core(
         store=TrackStore(capacity, len(radars), filter.columns),
         numbers=TrackNumbers(LAST_ASTERIX_NUMBER if settings.reporting.asterix_numbers else 0),
         clocks=[RadarClock(one.video.period_s) for one in radars],
-        pools=[EMPTY.copy() for _ in radars],
+        pools=[PlotPool() for _ in radars],
         false_plots=[FalsePlots.around(one) for one in radars],
         counters={},
         azimuths=tuple(one.video.azimuths for one in radars),

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.kernels.compiled import allocating
 from pipeline.sites import RadarSite
-from pipeline.tables.arrays import Array, Floats
+from pipeline.tables.arrays import Floats
 
 REACH = 0.5
 """A false plot strays by about this many cells of the grid, so it is shared among four."""
@@ -80,15 +80,9 @@ class FalsePlots:
     def _gain(self) -> float:
         return max(1.0 / self.memory, 1.0 / (self.turns + FIRST_TURNS))
 
-    def learn(self, place: Floats, plots: Floats) -> None:
-        """At these places (n, 2) there were so many false plots (n,)."""
-        self.coming = np.concatenate([self.coming, np.column_stack([place, plots])])
-
-    def density(self, place: Floats) -> Floats:
-        """(n,) false plots a square metre and turn at places (n, 2), as far as learnt."""
-        made = np.zeros(len(place))
-        _read(self._cells(place), self.rate, made)
-        return made / (self.scale * self.step**2)
+    def learn(self, found: Floats) -> None:
+        """At places east and north in m there were so many false plots: (n, 3)."""
+        self.coming = np.concatenate([self.coming, found])
 
     def _cells(self, place: Floats) -> Floats:
         return np.asarray((place - (self.west, self.south)) / self.step - REACH)
@@ -107,12 +101,6 @@ def _spread(cell: Floats, amount: Floats, rate: Floats) -> None:
         rate[i, j + 1] += amount[k] * (1 - v) * u
         rate[i + 1, j] += amount[k] * v * (1 - u)
         rate[i + 1, j + 1] += amount[k] * v * u
-
-
-@allocating
-def _read(cell: Floats, rate: Floats, out: Array) -> None:
-    for k in range(len(cell)):
-        out[k] = learnt_rate(rate, cell[k, 0], cell[k, 1])
 
 
 @allocating

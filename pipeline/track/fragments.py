@@ -8,17 +8,20 @@ import numpy as np
 
 from pipeline.airport.model import SurfaceKind
 from pipeline.group.fragments import AIRCRAFT_HALF_EXTENT, FAST, LONGEST_AIRCRAFT, Tracks, find_fragments, grow_extent
+from pipeline.kernels.compiled import allocating
 from pipeline.tables import TargetClass
 from pipeline.tables.arrays import Array, Floats
 from pipeline.track.branching import likeliest
 from pipeline.track.core import Core
 from pipeline.track.judge import end_tracks
 from pipeline.track.neighbours import close_rows
-from pipeline.track.shape import extents
+from pipeline.track.shape import extents, fill_track_extent
 from pipeline.track.update import renew, restate
 
 MERGED_POSITION_SD = 0.1
 """Standard deviation of the middle of a joined target, as a fraction of the distance of its two fragments."""
+
+AIRCRAFT = int(TargetClass.AIRCRAFT)
 
 RANK_NAMED, RANK_AIRCRAFT, RANK_JOINED = 4.0, 2.0, 1.0
 """Which of two tracks goes on: one with an address before one without, then an aircraft, then one that already holds
@@ -40,35 +43,28 @@ def join_fragments(core: Core, time: float) -> None:
     extent, and of tracks that stay close together off runways and taxiways without ever moving.
     """
     store = core.store
-    whole_again = core.column("moving") & (core.column("category") != TargetClass.AIRCRAFT)
-    core.column("least_half_extent")[whole_again] = 0.0
     shown = likeliest(core, core.shown())
     reach = 0.5 * LONGEST_AIRCRAFT + core.settings.grouping.absorb_margin
     alive = close_rows(core, shown, time, reach)
-    if len(alive) < len(shown):
-        alone = np.ones(store.n, np.bool_)
-        alone[alive] = False
-        core.column("fragment_checks")[alone] = 0
-    if len(alive) < 2:
+    n = len(alive)
+    if n < 2:
+        _count_checks(store.rows[: store.n], alive, np.full(n, -1))
         return
-    _, (state, covariance) = core.predicted(alive, np.full(len(alive), time))
-    records = store.records(alive)
-    named, aircraft = records["named"], records["category"] == TargetClass.AIRCRAFT
+    _, (state, covariance) = core.predicted(alive, np.full(n, time))
     kind = core.zones.kind(state[:, 0], state[:, 1])
     on_apron = (kind != SurfaceKind.RUNWAY) & (kind != SurfaceKind.TAXIWAY)
     tracks = Tracks(
-        state=state,
-        covariance=covariance,
-        extent=extents(records),
-        longest_side=np.fmax(np.nan_to_num(records["length"]), np.nan_to_num(records["width"])),
-        named=named,
-        aircraft=aircraft,
-        on_apron=on_apron,
-        standing=on_apron & ~records["moved"] & ~named,
-        rank=RANK_NAMED * named + RANK_AIRCRAFT * aircraft + RANK_JOINED * (records["least_half_extent"] > 0),
-    )
+        state, covariance, np.empty((n, 3)), np.empty(n), np.empty(n, np.bool_), np.empty(n, np.bool_), on_apron,
+        np.empty(n, np.bool_), np.empty(n),
+    )  # fmt: skip
+    _describe(
+        store.rows, alive, on_apron, tracks.extent, tracks.longest_side, tracks.named, tracks.aircraft, tracks.standing,
+        tracks.rank,
+    )  # fmt: skip
+    named = tracks.named
     whole = find_fragments(tracks, core.settings.grouping.absorb_margin)
-    store.fragment_checks[alive] = np.where(whole >= 0, records["fragment_checks"] + 1, 0)
+    if not _count_checks(store.rows[: store.n], alive, whole):
+        return
     fast = np.hypot(state[whole, 2], state[whole, 3]) > FAST
     patience = np.where(fast, 0, core.settings.grouping.merge_after)
     gone: list[int] = []
@@ -83,6 +79,43 @@ def join_fragments(core: Core, time: float) -> None:
             gone.append(junior)
     core.count("fragments_joined", len(gone))
     end_tracks(core, np.array(gone, np.int64))
+
+
+@allocating
+def _describe(
+    tracks: Array, rows: Array, on_apron: Array, extent: Floats, longest_side: Floats, named: Array, aircraft: Array,
+    standing: Array, rank: Floats,
+) -> None:  # fmt: skip
+    """Write what `find_fragments` is told of tracks besides their motion."""
+    for k in range(len(rows)):
+        one = tracks[rows[k]]
+        if one["moving"] and one["category"] != AIRCRAFT:
+            one["least_half_extent"] = 0.0  # what moves is seen whole again
+        fill_track_extent(one, extent[k])
+        length, width = one["length"], one["width"]
+        longest_side[k] = max(length if math.isfinite(length) else 0.0, width if math.isfinite(width) else 0.0)
+        named[k], aircraft[k] = one["named"], one["category"] == AIRCRAFT
+        standing[k] = on_apron[k] and not one["moved"] and not named[k]
+        joined = one["least_half_extent"] > 0.0
+        rank[k] = RANK_NAMED * named[k] + RANK_AIRCRAFT * aircraft[k] + RANK_JOINED * joined
+
+
+@allocating
+def _count_checks(tracks: Array, rows: Array, whole: Array) -> bool:
+    """Count, of `rows`, the checks in which each was a fragment of another; the others are none. Whether any was."""
+    k, any_fragment = 0, False
+    for i in range(len(tracks)):
+        one = tracks[i]
+        if k < len(rows) and rows[k] == i:
+            fragment = whole[k] >= 0
+            one["fragment_checks"] = one["fragment_checks"] + 1 if fragment else 0
+            any_fragment = any_fragment or fragment
+            k += 1
+        else:
+            one["fragment_checks"] = 0
+            if one["moving"] and one["category"] != AIRCRAFT:
+                one["least_half_extent"] = 0.0
+    return any_fragment
 
 
 def _cover(core: Core, whole: int, fragment: int, away: Floats, parked: bool) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 
 from pipeline.contracts.lifecycle import Evidence
 from pipeline.kernels.compiled import allocating
-from pipeline.kernels.records import take
 from pipeline.tables.arrays import Array, Floats
 from pipeline.track.core import TENTATIVE, Core
 from pipeline.track.store import ENDED, NEVER
@@ -23,25 +22,30 @@ NOMINAL_PERIOD_S = 1.0
 
 def judge_tracks(core: Core, rows: Array, time: Floats) -> None:
     """Have the lifecycle part decide on the tracks `rows` (k,), each at its time (k,) UTC s."""
-    store, n = core.store, len(rows)
-    shape = (n, store.evidence.shape[1])
+    store, n, sensors = core.store, len(rows), core.store.evidence.shape[1]
+    shape = (n, sensors)
     facts = Evidence(
         np.empty(n, np.uint8), np.empty(shape, np.uint32), np.empty(shape, np.int32), np.empty(shape, np.int32),
         np.empty(shape), len(core.radars), np.empty(n), np.empty(n, np.bool_), np.empty(n),
     )  # fmt: skip
-    periods = tuple(max(one.period, NOMINAL_PERIOD_S) for one in core.clocks)
+    periods = np.array([one.period for one in core.clocks])
     invalid = _facts(
-        store.rows, store.evidence, store.time, rows, time, np.array(periods), core.settings.identity.protect_for,
-        *facts,
-    )  # fmt: skip
-    core.count("state_invalid", invalid)
+        store.rows, store.evidence, store.time, rows, time, periods, core.settings.identity.protect_for, *facts
+    )
+    if invalid:
+        core.count("state_invalid", invalid)
     phase, ended = core.lifecycle.judge(facts)
-    fresh, gone = _decide(store.rows, rows, phase, ended, bool(core.numbers.last))
-    if fresh:
-        _number_tracks(core, rows[(phase != TENTATIVE) & ~ended])
-    if gone:
-        _learn_false_plots(core, rows[ended & (phase == TENTATIVE)])
-        end_tracks(core, rows[ended])
+    gone, wanting, learnt, radar = np.empty(n, np.int64), np.empty(n, np.int64), np.empty((2 * n, 3)), np.empty(2 * n)
+    g, w, many = _decide(
+        store.rows, rows, phase, ended, core.numbers.last > 0, core.settings.extent.aircraft_length, gone, wanting,
+        learnt, radar,
+    )  # fmt: skip
+    if w:
+        _number_tracks(core, wanting[:w])
+    if many:
+        _learn_false_plots(core, learnt[:many], radar[:many])
+    if g:
+        end_tracks(core, gone[:g])
 
 
 def _number_tracks(core: Core, rows: Array) -> None:
@@ -82,49 +86,40 @@ def _share(core: Core, rows: Array) -> None:
             column[row] = column[(target == target[row]) & (phase != ENDED)].max()
 
 
-def _learn_false_plots(core: Core, rows: Array) -> None:
-    """Tracks that came to nothing were false plots: where they began and where they ended."""
-    if not len(rows):
-        return
-    learnt, radar = np.empty((2 * len(rows), 3)), np.empty(2 * len(rows), np.int64)
-    many = _came_to_nothing(core.store.rows, rows, core.settings.extent.aircraft_length, learnt, radar)
-    learnt, radar = learnt[:many], radar[:many]
+def _learn_false_plots(core: Core, learnt: Floats, radar: Array) -> None:
+    """Tracks that came to nothing were false plots of these radars (k,): places in m and how many (k, 3)."""
     for number, false_plots in enumerate(core.false_plots):
-        mine = learnt if len(core.radars) == 1 else learnt[radar == number]
-        false_plots.learn(mine[:, :2], mine[:, 2])
+        false_plots.learn(learnt if len(core.radars) == 1 else learnt[radar == number])
 
 
 def end_tracks(core: Core, rows: Array) -> None:
     """End the tracks `rows`. A number is given back with the last row of its target."""
     store = core.store
-    store.phase[rows] = ENDED
+    ended, numbers = np.empty(len(rows), np.int64), np.empty(len(rows), np.uint16)
     if not core.associate.branching:
-        core.count("ended", int((store.id[rows] > 0).sum()))
-        if core.numbers.last:
-            core.numbers.give_back(store.number[rows], core.time)
-        return
-    records = store.records(rows)
-    if len(rows):
+        many = _end(store.rows, rows, ended, numbers)
+    else:
+        store.phase[rows] = ENDED
         others = core.column("target")[core.alive()]
-        records = take(records, ~np.isin(records["target"], others))
-        records = take(records, np.unique(records["target"], return_index=True)[1])
-    core.count("ended", int((records["id"] > 0).sum()))
-    if core.numbers.last:
-        core.numbers.give_back(records["number"], core.time)
+        last = rows[~np.isin(store.target[rows], others)]
+        last = last[np.unique(store.target[last], return_index=True)[1]]
+        many = _end(store.rows, last, ended, numbers)
+    if many:
+        core.count("ended", many)
+        if core.numbers.last:
+            core.numbers.give_back(numbers[:many], core.time)
 
 
 @allocating
-def _came_to_nothing(tracks: Array, rows: Array, aircraft_length: float, learnt: Floats, radar: Array) -> int:
-    """Write place and number of the false plots of tracks that radars alone saw, and of which radar; how many."""
+def _end(tracks: Array, rows: Array, ended: Array, numbers: Array) -> int:
+    """End rows, and write those that bear an id, and their numbers; how many."""
     k = 0
     for i in rows:
         one = tracks[i]
-        if one["radar"] < 0 or max(one["node_time"], one["report_time"]) > NEVER or one["length"] > aircraft_length:
-            continue
-        learnt[k, :2], learnt[k + 1, :2] = one["birthplace"], one["state"][:2]
-        learnt[k : k + 2, 2] = FALSE_PLOT_SHARE * one["hits"]
-        radar[k : k + 2] = one["radar"]
-        k += 2
+        one["phase"] = ENDED
+        if one["id"] > 0:
+            ended[k], numbers[k] = i, one["number"]
+            k += 1
     return k
 
 
@@ -147,7 +142,7 @@ def _facts(
                 seen["history"], seen["looks"], seen["misses"], seen["score"],
             )  # fmt: skip
             if s < radars and seen["history"] != 0:
-                slowness = min(slowness, periods[s])
+                slowness = min(slowness, max(periods[s], NOMINAL_PERIOD_S))
         if slowness == np.inf:
             slowness = NOMINAL_PERIOD_S
         phase[k] = one["phase"]
@@ -164,14 +159,29 @@ def _facts(
 
 
 @allocating
-def _decide(tracks: Array, rows: Array, phase: Array, ended: Array, numbered: bool) -> tuple[int, int]:
-    """Write the phases; how many tracks want an id or a number, and how many end."""
-    fresh = gone = 0
+def _decide(
+    tracks: Array, rows: Array, phase: Array, ended: Array, numbered: bool, aircraft_length: float, gone: Array,
+    wanting: Array, learnt: Floats, radar: Floats,
+) -> tuple[int, int, int]:  # fmt: skip
+    """Write the phases, and the rows that end, those that want an id or a number, and the places of false plots.
+
+    Of tracks that radars alone saw and that came to nothing: place, number, and radar of the false plots. How many.
+    """
+    g = w = many = 0
     for k in range(len(rows)):
         one = tracks[rows[k]]
         one["phase"] = phase[k]
-        if ended[k]:
-            gone += 1
-        elif phase[k] != TENTATIVE and (one["id"] == 0 or (numbered and one["number"] == 0)):
-            fresh += 1
-    return fresh, gone
+        if not ended[k]:
+            if phase[k] != TENTATIVE and (one["id"] == 0 or (numbered and one["number"] == 0)):
+                wanting[w] = rows[k]
+                w += 1
+            continue
+        gone[g] = rows[k]
+        g += 1
+        alone = one["radar"] >= 0 and max(one["node_time"], one["report_time"]) == NEVER
+        if phase[k] == TENTATIVE and alone and not one["length"] > aircraft_length:
+            learnt[many, :2], learnt[many + 1, :2] = one["birthplace"], one["state"][:2]
+            learnt[many : many + 2, 2] = FALSE_PLOT_SHARE * one["hits"]
+            radar[many : many + 2] = one["radar"]
+            many += 2
+    return g, w, many

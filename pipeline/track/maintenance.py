@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.group.enclosing import enclosing_track
+from pipeline.group.enclosing import OUTSIDE, farthest_within, place_within
+from pipeline.kernels.cells import sort_into_cells, span
 from pipeline.kernels.compiled import allocating
 from pipeline.tables import TargetCategory, TargetClass, TrackPhase
 from pipeline.tables.arrays import Array, Floats
 from pipeline.track.branching import likeliest
-from pipeline.track.core import Core, clear_identity
+from pipeline.track.core import TENTATIVE, Core, clear_identity
 from pipeline.track.fragments import absorb, join_fragments
 from pipeline.track.judge import end_tracks, judge_tracks
 from pipeline.track.latency import with_latency
@@ -17,9 +18,10 @@ from pipeline.track.neighbours import close_rows
 from pipeline.track.shape import SETTLED, extents, fill_track_extent
 from pipeline.track.store import NEVER
 
-JUDGE_INTERVAL_S = 0.5
-"""Between two times at which all tracks are judged, whether looked at or not: a fifth of the shortest silence that
-changes something."""
+JUDGE_INTERVAL_S = 0.4
+"""Between two times at which all tracks are judged, whether looked at or not, at least: a sixth of the shortest silence
+that changes something. It happens at the next half turn, or sooner when the clock says so: with a radar of a second, at
+each half turn, though that may come a little early."""
 
 MAINTENANCE_INTERVAL_S = 1.0
 """Between two searches for duplicates and fragments. What must be found in several checks has then lasted seconds,
@@ -29,9 +31,8 @@ DUPLICATE_DISTANCE_M = 150.0
 """In east and in north, beyond which two tracks are not compared: the size of a large aircraft, and what it moves by in
 a second on the final approach, by which its reports may be late."""
 
-FARTHEST_INSIDE_M = 250.0
-"""East or west of the middle of a track, nothing lies within its extent: the longest echo is 200 m, and both have moved
-since they were seen."""
+CELL_M = 50.0
+"""m, side of the cells in which young tracks are searched: about the length of a large aircraft."""
 
 DUPLICATE_GATE = 6.0
 """Squared Mahalanobis distance of the positions, up to which two tracks may be one target: 95 % in two dimensions."""
@@ -53,6 +54,8 @@ FAST_ALIKE = 8.0
 SEEN_APART_S = 5.0
 """Two tracks that a radar saw at the same time for so long are two targets, although it sees one of them no more."""
 
+CONFIRMED = int(TrackPhase.CONFIRMED)
+
 VEHICLE, AIRCRAFT = 1, 2
 """Marks of a track reported as a vehicle, and of another one classified as an aircraft; 0 for all others."""
 
@@ -70,10 +73,11 @@ def keep_house(core: Core, time: float) -> None:
     if abs(time - core.maintenance_time) < MAINTENANCE_INTERVAL_S:
         return
     core.maintenance_time = time
-    unheard = core.column("report_time") < time - core.settings.identity.forget_after
-    stale = np.flatnonzero(core.column("named") & unheard)
-    core.count("identity_stale", len(stale))
-    clear_identity(core, stale)
+    if core.reports_taken:
+        unheard = core.column("report_time") < time - core.settings.identity.forget_after
+        stale = np.flatnonzero(core.column("named") & unheard)
+        core.count("identity_stale", len(stale))
+        clear_identity(core, stale)
     _merge_duplicates(core, time)
     join_fragments(core, time)
     _end_fragments(core)
@@ -152,20 +156,12 @@ def _find_starved(
 
 def _end_fragments(core: Core) -> None:
     """End tentative tracks by radar alone inside the extent of an established track: they are fragments of its echo."""
-    store = core.store
-    phase, count = core.column("phase"), core.column("extent_count")
-    alone = np.maximum(core.column("node_time"), core.column("report_time")) == NEVER
-    young = np.flatnonzero((phase == TrackPhase.TENTATIVE) & (count > 0) & alone)
-    old = np.flatnonzero((phase == TrackPhase.CONFIRMED) & (count >= SETTLED))
-    if not len(young) or not len(old):
-        return
-    old = old[np.argsort(store.state[old, 0], kind="stable")]
-    inside = np.zeros(len(young), np.bool_)
-    _inside(
-        store.rows, store.time, store.state, store.covariance, old, young, core.settings.grouping.absorb_margin, inside
-    )
-    core.count("absorbed_tracks", int(inside.sum()))
-    end_tracks(core, young[inside])
+    n = core.store.n
+    gone = np.empty(n, np.int64)
+    many = _inside(core.store.rows[:n], core.store.time, core.settings.grouping.absorb_margin, gone)
+    if many:
+        core.count("absorbed_tracks", many)
+        end_tracks(core, gone[:many])
 
 
 @allocating
@@ -180,26 +176,54 @@ def _reset(tracks: Array, rows: Array, but: Array) -> None:
 
 
 @allocating
-def _inside(
-    tracks: Array, time: Floats, state: Floats, covariance: Floats, old: Array, young: Array, margin: float,
-    inside: Array,
-) -> None:  # fmt: skip
-    """Which of `young` lie in the extent of one of `old`, which are sorted by east."""
+def _inside(tracks: Array, time: Floats, margin: float, gone: Array) -> int:
+    """Write the tentative tracks that radars alone saw within the extent of an established track; how many."""
     n = len(tracks)
-    established, extent, own = np.ones(n, np.bool_), np.empty((n, 3)), np.empty(3)
-    east = np.empty(len(old))
-    for k in range(len(old)):
-        fill_track_extent(tracks[old[k]], extent[old[k]])
-        east[k] = state[old[k], 0]
-    for k in range(len(young)):
-        i = young[k]
-        fill_track_extent(tracks[i], own)
-        first = np.searchsorted(east, state[i, 0] - FARTHEST_INSIDE_M)
-        last = np.searchsorted(east, state[i, 0] + FARTHEST_INSIDE_M)
-        inside[k] = enclosing_track(
-            old[first:last], established, time, state, covariance, extent, time[i], state[i, :2],
-            covariance[i, :2, :2], own[0], margin,
-        ) >= 0  # fmt: skip
+    young, old = np.empty(n, np.int64), np.empty(n, np.int64)
+    place = np.empty((n, 2))
+    y = o = 0
+    earliest, latest = np.inf, -np.inf
+    for i in range(n):
+        one = tracks[i]
+        if one["phase"] == TENTATIVE:
+            if one["extent_count"] > 0 and max(one["node_time"], one["report_time"]) == NEVER:
+                young[y], place[i, 0], place[i, 1] = i, one["state"][0], one["state"][1]
+                earliest, latest = min(earliest, time[i]), max(latest, time[i])
+                y += 1
+        elif one["phase"] == CONFIRMED and one["extent_count"] >= SETTLED:
+            old[o] = i
+            o += 1
+    if y == 0 or o == 0:
+        return 0
+    start, order, grid = sort_into_cells(place, young[:y], CELL_M)
+    west, south, cell, nx, ny = grid[0], grid[1], grid[2], int(grid[3]), int(grid[4])
+    inside, extent, own = np.zeros(n, np.bool_), np.empty(3), np.empty(3)
+    for i in old[:o]:
+        x = tracks[i]["state"]
+        fill_track_extent(tracks[i], extent)
+        passed = max(abs(latest - time[i]), abs(time[i] - earliest))
+        far = farthest_within(extent, margin)
+        e, w = far + passed * abs(x[2]), far + passed * abs(x[3])
+        x_from, x_to = span(x[0] - e - west, x[0] + e - west, cell, nx)
+        y_from, y_to = span(x[1] - w - south, x[1] + w - south, cell, ny)
+        for cy in range(y_from, y_to):
+            for k in range(start[cy * nx + x_from], start[cy * nx + x_to] if x_to > x_from else 0):
+                j = order[k]
+                if inside[j]:
+                    continue
+                other = tracks[j]
+                fill_track_extent(other, own)
+                ratio = place_within(
+                    time[i], x, tracks[i]["covariance"], extent, time[j], other["state"], other["covariance"], own[0],
+                    margin,
+                )  # fmt: skip
+                inside[j] = ratio < OUTSIDE
+    many = 0
+    for j in young[:y]:
+        if inside[j]:
+            gone[many] = j
+            many += 1
+    return many
 
 
 @allocating

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.kernels.cells import sort_into_cells, span
 from pipeline.kernels.compiled import allocating
 from pipeline.tables.arrays import Array, Floats
 from pipeline.track.core import Core
@@ -20,29 +21,29 @@ def close_rows(core: Core, rows: Array, time: float, reach: float, marked: Array
     """
     if len(rows) < 2 or (marked is not None and not marked.any()):
         return rows[:0]
-    place = np.empty((len(rows), 2))
-    _move(core.store.rows, core.store.time, rows, time, place)
     near = np.zeros(len(rows), np.bool_)
     every = np.ones(len(rows), np.bool_) if marked is None else marked
-    _search(np.argsort(place[:, 0], kind="stable"), place, every, reach + MARGIN_M, near)
+    _search(core.store.rows, core.store.time, rows, time, every, reach + MARGIN_M, near)
     return np.asarray(rows[near])
 
 
 @allocating
-def _move(tracks: Array, own_time: Floats, rows: Array, time: float, place: Floats) -> None:
+def _search(
+    tracks: Array, own_time: Floats, rows: Array, time: float, marked: Array, reach: float, near: Array
+) -> None:
+    place = np.empty((len(rows), 2))
     for k in range(len(rows)):
         x, dt = tracks[rows[k]]["state"], time - own_time[rows[k]]
         place[k, 0], place[k, 1] = x[0] + dt * x[2], x[1] + dt * x[3]
-
-
-@allocating
-def _search(order: Array, place: Floats, marked: Array, reach: float, near: Array) -> None:
-    """order: rows by east."""
-    for a in range(len(order)):
-        i = order[a]
-        for b in range(a + 1, len(order)):
-            j = order[b]
-            if place[j, 0] - place[i, 0] > reach:
-                break
-            if abs(place[j, 1] - place[i, 1]) <= reach and (marked[i] or marked[j]):
-                near[i] = near[j] = True
+    start, order, grid = sort_into_cells(place, np.arange(len(rows)), reach)
+    west, south, cell, nx, ny = grid[0], grid[1], grid[2], int(grid[3]), int(grid[4])
+    for i in range(len(rows)):
+        if not marked[i]:
+            continue
+        x_from, x_to = span(place[i, 0] - reach - west, place[i, 0] + reach - west, cell, nx)
+        y_from, y_to = span(place[i, 1] - reach - south, place[i, 1] + reach - south, cell, ny)
+        for cy in range(y_from, y_to):
+            for o in range(start[cy * nx + x_from], start[cy * nx + x_to] if x_to > x_from else 0):
+                j = order[o]
+                if j != i and abs(place[j, 0] - place[i, 0]) <= reach and abs(place[j, 1] - place[i, 1]) <= reach:
+                    near[i] = near[j] = True

@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.airport.model import SurfaceKind
 from pipeline.contracts.measured import RECORD_FIELDS
 from pipeline.kernels.compiled import allocating
-from pipeline.kernels.records import joined, plain, take
+from pipeline.kernels.records import plain, take_records
 from pipeline.tables import Plots
 from pipeline.tables.arrays import Array, Floats
 from pipeline.track.shape import fill_extent
@@ -29,8 +29,6 @@ POOL = np.dtype(
 """A measurement with covariance: m^2, that of the plot itself; row: absolute row of its azimuth; spent: a track took
 it, or it began one; long: its own length is that of an aircraft; surface: SurfaceKind at its place."""
 
-EMPTY = np.empty(0, POOL)
-
 GOOD, INVALID, LATE, FUTURE, STALE = 0, 1, 2, 3, 4
 """What is found of a plot."""
 
@@ -44,61 +42,121 @@ PAVED = np.isin(np.arange(256), (SurfaceKind.RUNWAY, SurfaceKind.TAXIWAY, Surfac
 """(256,) by SurfaceKind: where targets are at home and false plots are few."""
 
 
-def pool_plots(
-    plots: Plots, bounds: tuple[float, float, float], clock: tuple[float, float, int], azimuths: int,
-    sensor: int, aircraft_length: float,
-) -> tuple[Array, Array]:  # fmt: skip
-    """Records (k,) of the plots that can be true, and how many (5,) were found GOOD .. STALE.
-
-    bounds: UTC s before which a plot is late and after which it lies in the future, absolute row before which it is
-    stale. clock: UTC s at an absolute row, s a turn, and that row.
-    """
-    made, found = np.empty(len(plots), POOL), np.zeros(5, np.int64)
-    if not len(plots):
-        return made, found
-    many = _pool(
-        plain(plots.time), plain(plots.east), plain(plots.north), plain(plots.covariance), plain(plots.range),
-        plain(plots.azimuth), plain(plots.range_extent), plain(plots.azimuth_extent), plain(plots.length),
-        plain(plots.width), plain(plots.bearing), plain(plots.bearing_sd), plain(plots.cells), bounds, clock,
-        azimuths, sensor, aircraft_length, made, found,
-    )  # fmt: skip
-    return made[:many], found
-
-
-def pool_of(columns: Mapping[str, Array]) -> Array:
-    """Records (k,) from all their columns (k, ...) by name."""
-    made = np.empty(len(columns["row"]), POOL)
-    for name in POOL.names or ():
-        made[name] = columns[name]
-    return made
-
-
-def merged(waiting: Array, fresh: Array) -> Array:
-    """Both by row, then time and place, so that nothing depends on how they were delivered."""
-    pool = joined(waiting, fresh) if len(waiting) else fresh
-    if len(pool) > INSERTION_MOST:
-        position = pool["position"]
-        return take(pool, np.lexsort((position[:, 1], position[:, 0], pool["time"], pool["row"])))
-    order = np.arange(len(pool))
-    return take(pool, order) if _sort(pool, order) else pool
-
+FIRST_ROOM = 256
+"""Plots that there is room for at first; it grows with what comes."""
 
 INSERTION_MOST = 128
-"""Plots up to which sorting by insertion is faster than four sorts by merging."""
+"""Plots up to which sorting by insertion alone is faster than sorting by row first."""
+
+
+class PlotPool:
+    """The plots of one radar that wait, by row, then time and place, so that nothing depends on how they came.
+
+    They stay where they are in memory between calls: making arrays of records is slow in numpy, which looks at each
+    field.
+    """
+
+    def __init__(self) -> None:
+        self._records, self._spare = np.empty(FIRST_ROOM, POOL), np.empty(FIRST_ROOM, POOL)
+        self._n = 0
+
+    def __len__(self) -> int:
+        return self._n
+
+    @property
+    def records(self) -> Array:
+        """(n,) records, as a view that holds until the pool is changed."""
+        made: Array = self._records[: self._n]
+        return made
+
+    def take_in(
+        self, plots: Plots, bounds: tuple[float, float, float], clock: tuple[float, float, int], azimuths: int,
+        sensor: int, aircraft_length: float,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """Append records of the plots that can be true; they (k,), as a view, and how many (5,) were GOOD .. STALE.
+
+        bounds: UTC s before which a plot is late and after which it lies in the future, absolute row before which it is
+        stale. clock: UTC s at an absolute row, s a turn, and that row. To be followed by `sort`.
+        """
+        many, found = len(plots.time), np.zeros(5, np.int64)
+        self._make_room(self._n + many)
+        made = self._records[self._n : self._n + many]
+        good = _pool(
+            plain(plots.time), plain(plots.east), plain(plots.north), plain(plots.covariance), plain(plots.range),
+            plain(plots.azimuth), plain(plots.range_extent), plain(plots.azimuth_extent), plain(plots.length),
+            plain(plots.width), plain(plots.bearing), plain(plots.bearing_sd), plain(plots.cells), bounds, clock,
+            azimuths, sensor, aircraft_length, made, found,
+        )  # fmt: skip
+        self._n += good
+        return made[:good], found
+
+    def sort(self) -> None:
+        """Put what was appended in its place."""
+        records = self.records
+        order = np.arange(self._n) if self._n <= INSERTION_MOST else np.argsort(records["row"], kind="stable")
+        if _sort(records, order):
+            take_records(records, order, self._spare)
+            self._records, self._spare = self._spare, self._records
+
+    def copies(self, rows: Array) -> Array:
+        """Copies of the records of rows (k,), as a view that holds until the next call."""
+        take_records(self._records, rows, self._spare)
+        made: Array = self._spare[: len(rows)]
+        return made
+
+    def drop_spent(self) -> None:
+        """Remove the plots that are spent."""
+        self._n = _drop_spent(self._records, self._n)
+
+    def clear(self) -> None:
+        """Remove all."""
+        self._n = 0
+
+    def save(self) -> dict[str, Array]:
+        """Copies of all columns (n, ...) by name."""
+        return {name: self.records[name].copy() for name in POOL.names or ()}
+
+    @classmethod
+    def of(cls, columns: Mapping[str, Array]) -> PlotPool:
+        """A pool of all its columns (n, ...) by name, as `save` gave them."""
+        made = cls()
+        made._make_room(len(columns["row"]))
+        made._n = len(columns["row"])
+        for name in POOL.names or ():
+            made.records[name] = columns[name]
+        return made
+
+    def _make_room(self, wanted: int) -> None:
+        if wanted > len(self._records):
+            records, self._spare = np.empty(2 * wanted, POOL), np.empty(2 * wanted, POOL)
+            take_records(self._records, np.arange(self._n), records)
+            self._records = records
 
 
 @allocating
 def _sort(pool: Array, order: Array) -> bool:
-    """Sort `order` (k,), at first 0 .. k - 1, by insertion; whether anything moved."""
+    """Sort `order` (k,), rows of a pool, by insertion; whether anything is to be moved."""
     moved = False
-    for k in range(1, len(order)):
+    for k in range(len(order)):
         one, j = order[k], k - 1
         while j >= 0 and _before(pool[one], pool[order[j]]):
             order[j + 1] = order[j]
             j -= 1
-            moved = True
         order[j + 1] = one
+        moved |= one != k or j + 1 != k
     return moved
+
+
+@allocating
+def _drop_spent(records: Array, n: int) -> int:
+    """Move together the records that are not spent; how many."""
+    kept = 0
+    for k in range(n):
+        if not records[k]["spent"]:
+            if kept != k:
+                records[kept] = records[k]
+            kept += 1
+    return kept
 
 
 @allocating

@@ -76,7 +76,7 @@ class RadarClock:
         rows, passed = sector.closed_to - before, sector.time - self.newest
         waited = min(max(passed, 0.0), max(self.period, nominal))
         self.step = max(waited, self.step * math.exp(-waited / STEP_MEMORY_S))
-        if len(sector.mark):
+        if len(sector.mark) or self.last_mark != NO_MARK:
             self.closed_to, self.newest = sector.closed_to, sector.time
             self._take_marks(sector.mark, sector.mark_time, azimuths, nominal)
             return
@@ -100,8 +100,8 @@ class RadarClock:
         self._append(mark, time, np.full(len(mark), self.period))
 
     def set_by(self, rows: Array, times: Floats, azimuths: int) -> None:
-        """Plots tell at what time the antenna was at their row, where the sectors have no marks."""
-        if len(rows):
+        """Plots tell at what time the antenna was at their row, where no sector has brought marks."""
+        if len(rows) and self.last_mark == NO_MARK:
             told = float(np.median(times + (self.closed_to - rows) * (self.period / azimuths)))
             earliest = self.newest - HELD_BACK_TURNS * self.period
             if earliest <= told <= self.newest + AHEAD_TURNS * self.period:
@@ -155,6 +155,8 @@ class RadarClock:
         for number, at in zip(mark.tolist(), time.tolist(), strict=True):
             turns, passed = (number - self.last_mark) / MARKS_A_TURN, at - self.last_mark_time
             if not at <= self.newest or (self.last_mark != NO_MARK and (turns <= 0 or not passed > 0)):
+                continue
+            if mark_row(number, azimuths) > self.closed_to + MOST_TURNS * azimuths:
                 continue
             if self.last_mark != NO_MARK and turns <= MOST_TURNS:
                 self._learn(passed / turns, turns, nominal)

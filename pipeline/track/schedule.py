@@ -42,6 +42,15 @@ WAKE_TURNS = 0.625
 the guard by which a look may lie before them, lest the plan depend on which marks those are."""
 
 
+HALF_TURN = MARKS_A_TURN // 2
+"""Marks within which a radar looks at a track once at most."""
+
+
+def starts_half(mark: int) -> bool:
+    """Whether a half turn of its radar starts at a mark."""
+    return mark % HALF_TURN == 0
+
+
 class Marks(NamedTuple):
     """Marks of one radar that are decided together, k of them: number int64, absolute row, UTC s, s a turn.
 
@@ -63,9 +72,9 @@ def next_marks(
 
     Marks are decided in the order of their times over all radars, so that it does not matter in what blocks the radars
     deliver: a mark waits for the other radars, but not for one that has fallen silent. newest: UTC s of the newest
-    sweep of all. began: of the first. until: UTC s; a mark after it is not decided together with one before it. Nor are
-    marks of two turns, or of more than half a turn, within which a radar looks at a track once at most; and the first
-    after a gap, at which all looks of the gap are decided, stands alone.
+    sweep of all. began: of the first. until: UTC s; a mark after it at which a half turn starts is not decided together
+    with those before it. Nor are marks of two turns, or of more than half a turn, within which a radar looks at a track
+    once at most; and the first after a gap, at which all looks of the gap are decided, stands alone.
     """
     ready = [clock.ready(one) for clock, one in zip(clocks, azimuths, strict=True)]
     firsts = [(float(clocks[r].mark_time[0]), r) for r, many in enumerate(ready) if many]
@@ -81,9 +90,9 @@ def next_marks(
         elif one.awaited(newest, began):
             last = min(last, (one.decided_time, radar))
     times, numbers = clock.mark_time[: ready[radar]].tolist(), clock.mark[: ready[radar]].tolist()
-    many, gap = 0, numbers[0] - clock.decided > MARKS_A_TURN // 2
+    many, gap = 0, numbers[0] - clock.decided > HALF_TURN
     for number, time in zip(numbers, times, strict=True):
-        apart = number % MARKS_A_TURN == 0 or time > until or number - numbers[0] >= MARKS_A_TURN // 2
+        apart = number - numbers[0] >= HALF_TURN or number % MARKS_A_TURN == 0 or (starts_half(number) and time > until)
         if (time, radar) > last or (many and (apart or gap)):
             break
         many += 1

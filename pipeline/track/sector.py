@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 
 from pipeline.tables import SectorPlots
-from pipeline.tables.arrays import Array
 from pipeline.track.core import Core
-from pipeline.track.plot_pool import EMPTY, FUTURE, INVALID, LATE, STALE, merged, pool_plots
+from pipeline.track.plot_pool import FUTURE, INVALID, LATE, STALE
 from pipeline.track.radar_clock import RadarClock
 from pipeline.track.step import advance_radars
 from pipeline.track.store import NEVER
@@ -31,34 +30,31 @@ def take_sector(core: Core, sector: SectorPlots) -> bool:
     core.time = max(core.time, sector.time)
     core.count("sector_degraded", int(sector.degraded))
     if len(sector.plots):
-        fresh = _fresh(core, sector)
-        if not len(sector.mark):
-            clock.set_by(fresh["row"], fresh["time"], azimuths)
-        core.pools[sector.radar] = merged(core.pools[sector.radar], fresh)
+        _pool(core, sector)
     clock.infer_marks(sector, azimuths)
     advance_radars(core, max(one.newest for one in core.clocks))
     return True
 
 
-def _fresh(core: Core, sector: SectorPlots) -> Array:
-    """Records of the plots of a sector that can be true; the others are counted."""
-    site, clock = core.radars[sector.radar], core.clocks[sector.radar]
+def _pool(core: Core, sector: SectorPlots) -> None:
+    """Pool the plots of a sector that can be true; the others are counted."""
+    site, clock, pool = core.radars[sector.radar], core.clocks[sector.radar], core.pools[sector.radar]
     azimuths, settings = site.video.azimuths, core.settings
     bounds = (
         sector.time - settings.timing.max_lag - clock.period,
         sector.time + EARLY_TURNS * clock.period,
         float(sector.closed_to - STALE_TURNS * azimuths),
     )
-    fresh, found = pool_plots(
-        sector.plots, bounds, clock.antenna(azimuths), azimuths, sector.radar,
-        settings.extent.aircraft_length,
-    )  # fmt: skip
-    if len(fresh) < len(sector.plots):
+    fresh, found = pool.take_in(
+        sector.plots, bounds, clock.antenna(azimuths), azimuths, sector.radar, settings.extent.aircraft_length
+    )
+    if len(fresh) < found.sum():
         for what, reason in ((INVALID, "invalid"), (LATE, "late"), (FUTURE, "future"), (STALE, "stale")):
             core.count(f"plot_{reason}", int(found[what]))
     position = fresh["position"]
     fresh["surface"] = core.zones.kind(position[:, 0], position[:, 1])
-    return fresh
+    clock.set_by(fresh["row"], fresh["time"], azimuths)
+    pool.sort()
 
 
 def _acceptable(core: Core, sector: SectorPlots) -> bool:
@@ -88,6 +84,6 @@ def _restart(core: Core, sector: SectorPlots) -> None:
     core.count("radar_restarted")
     video, look = core.radars[sector.radar].video, core.store.look[:, sector.radar]
     core.clocks[sector.radar] = RadarClock(video.period_s)
-    core.pools[sector.radar] = EMPTY.copy()
+    core.pools[sector.radar].clear()
     look["last"] = sector.closed_from - video.azimuths // 2
     look["planned"], look["wake"] = False, 0

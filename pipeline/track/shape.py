@@ -55,20 +55,15 @@ def extents(rows: Array) -> Floats:
     return made
 
 
-def reshape(
-    rule: ExtentSettings, store: Array, rows: Array, before: Floats, period: float, time: Floats, extent: Floats,
-    bearing_sd: Array, plot: Array,
-) -> None:  # fmt: skip
-    """Smooth extent and heading of the tracks `rows` (k,) of the store's records with the plot that each took.
+Rule = tuple[float, float, float, float, float, float, float, float, float]
 
-    before: (k,) UTC s of the plot before, minus infinity for none: then `period` s count. time: (m,) UTC s, extent:
-    (m, 3) and bearing_sd: (m,) of plots, of which `plot` (k,) are taken, -1 for none.
-    """
-    settings = (
-        math.log1p(-rule.grow), math.log1p(-rule.shrink), math.log1p(-AXIS_GAIN), math.log1p(-HEADING_GAIN),
-        rule.start_speed, rule.stop_speed, rule.reverse_speed, rule.bearing_sd, rule.speed_sigmas,
+
+def shape_rule(settings: ExtentSettings) -> Rule:
+    """The settings of `shape_row`: logarithms of what is left of a difference after a second, and bounds."""
+    return (
+        math.log1p(-settings.grow), math.log1p(-settings.shrink), math.log1p(-AXIS_GAIN), math.log1p(-HEADING_GAIN),
+        settings.start_speed, settings.stop_speed, settings.reverse_speed, settings.bearing_sd, settings.speed_sigmas,
     )  # fmt: skip
-    _reshape(settings, store, rows, before, period, time, extent, bearing_sd, plot)
 
 
 @allocating
@@ -119,52 +114,51 @@ def _turn(a: float, b: float) -> float:
 
 
 @allocating
-def _reshape(
-    rule: tuple[float, float, float, float, float, float, float, float, float], store: Array, rows: Array,
-    before: Floats, period: float, time: Floats, extent: Floats, bearing_sd: Array, plot: Array,
-) -> None:  # fmt: skip
+def shape_row(rule: Rule, one: Array, before: float, period: float, plot: Array) -> None:
+    """Smooth extent and heading of a track, a record of the store, with the plot that it took, one of a pool.
+
+    rule: see `shape_rule`. before: UTC s of the plot before, minus infinity for none: then `period` s count.
+    """
     log_grow, log_shrink, log_axis, log_heading = rule[0], rule[1], rule[2], rule[3]
     start_speed, stop_speed, reverse_speed, most_bearing_sd, speed_sigmas = rule[4], rule[5], rule[6], rule[7], rule[8]
-    for k in range(len(rows)):
-        one, j = store[rows[k]], plot[k]
-        if j < 0:
-            continue
-        long, short, bearing = extent[j, 0], extent[j, 1], extent[j, 2]
-        since = time[j] - before[k] if math.isfinite(before[k]) else period
-        dt = min(max(since, 0.0), MOST_SINCE_S)
-        sure = math.isfinite(bearing) and (not math.isfinite(bearing_sd[j]) or bearing_sd[j] <= most_bearing_sd)
-        x, p, axis, heading = one["state"], one["covariance"], one["axis_bearing"], one["heading"]
-        speed = math.hypot(x[2], x[3])
-        noise = math.sqrt(0.5 * (p[2, 2] + p[3, 3]))
-        least = stop_speed if one["moving"] else max(start_speed, speed_sigmas * noise)
-        one["moving"] = one["moved"] and speed > least
-        if sure:
-            if not math.isfinite(axis):
-                axis = bearing % math.pi
-            else:
-                axis = (axis - math.expm1(log_axis * dt) * _axis_difference(bearing, axis)) % math.pi
-            one["axis_bearing"] = axis
-        if one["moving"]:
-            course = math.atan2(x[2], x[3])
-            known = math.isfinite(heading)
-            backwards = known and speed < reverse_speed and math.cos(course - heading) < BACKWARDS
-            aim = course + math.pi if backwards else course
-            if sure and long > LONG_PLOT * short and abs(_axis_difference(bearing, aim)) < AXIS_AGREES:
-                aim += AXIS_SHARE * _axis_difference(bearing, aim)
-            if known:
-                difference = _turn(aim, heading)
-                aim = heading + difference * (-math.expm1(log_heading * dt) if abs(difference) < SUDDEN_TURN else 1.0)
-            heading = aim % (2 * math.pi)
-            one["heading"] = heading
-        if not long > 0.0:
-            continue
-        pointing = heading if math.isfinite(heading) else axis
-        if math.isfinite(bearing) and math.isfinite(pointing) and abs(_axis_difference(bearing, pointing)) > QUARTER:
-            long, short = short, long
-        if one["extent_count"] == 0:
-            one["length"], one["width"] = long, short
+    long, short, bearing = float(plot["extent"][0]), float(plot["extent"][1]), float(plot["extent"][2])
+    since = plot["time"] - before if math.isfinite(before) else period
+    dt = min(max(since, 0.0), MOST_SINCE_S)
+    bearing_sd = plot["bearing_sd"]
+    sure = math.isfinite(bearing) and (not math.isfinite(bearing_sd) or bearing_sd <= most_bearing_sd)
+    x, p = one["state"], one["covariance"]
+    axis, heading = float(one["axis_bearing"]), float(one["heading"])
+    speed = math.hypot(x[2], x[3])
+    noise = math.sqrt(0.5 * (p[2, 2] + p[3, 3]))
+    least = stop_speed if one["moving"] else max(start_speed, speed_sigmas * noise)
+    one["moving"] = one["moved"] and speed > least
+    if sure:
+        if not math.isfinite(axis):
+            axis = bearing % math.pi
         else:
-            longer, wider = long - one["length"], short - one["width"]
-            one["length"] -= math.expm1((log_grow if longer > 0.0 else log_shrink) * dt) * longer
-            one["width"] -= math.expm1((log_grow if wider > 0.0 else log_shrink) * dt) * wider
-        one["extent_count"] += 1
+            axis = (axis - math.expm1(log_axis * dt) * _axis_difference(bearing, axis)) % math.pi
+        one["axis_bearing"] = axis
+    if one["moving"]:
+        course = math.atan2(x[2], x[3])
+        known = math.isfinite(heading)
+        backwards = known and speed < reverse_speed and math.cos(course - heading) < BACKWARDS
+        aim = course + math.pi if backwards else course
+        if sure and long > LONG_PLOT * short and abs(_axis_difference(bearing, aim)) < AXIS_AGREES:
+            aim += AXIS_SHARE * _axis_difference(bearing, aim)
+        if known:
+            difference = _turn(aim, heading)
+            aim = heading + difference * (-math.expm1(log_heading * dt) if abs(difference) < SUDDEN_TURN else 1.0)
+        heading = aim % (2 * math.pi)
+        one["heading"] = heading
+    if not long > 0.0:
+        return
+    pointing = heading if math.isfinite(heading) else axis
+    if math.isfinite(bearing) and math.isfinite(pointing) and abs(_axis_difference(bearing, pointing)) > QUARTER:
+        long, short = short, long
+    if one["extent_count"] == 0:
+        one["length"], one["width"] = long, short
+    else:
+        longer, wider = long - one["length"], short - one["width"]
+        one["length"] -= math.expm1((log_grow if longer > 0.0 else log_shrink) * dt) * longer
+        one["width"] -= math.expm1((log_grow if wider > 0.0 else log_shrink) * dt) * wider
+    one["extent_count"] += 1

@@ -21,7 +21,7 @@ from pipeline.tables.marks import mark_row, marks_between
 from pipeline.track.core import Core, ZoneLookup, make_core, shift_times
 from pipeline.track.maintenance import MAINTENANCE_INTERVAL_S, keep_house
 from pipeline.track.node_update import take_node_events
-from pipeline.track.plot_pool import POOL, pool_of
+from pipeline.track.plot_pool import PlotPool
 from pipeline.track.report_update import take_target_reports
 from pipeline.track.reported import reported_tracks
 from pipeline.track.sector import take_sector
@@ -110,7 +110,7 @@ class Tracker:
     def save(self) -> dict[str, Any]:
         """The whole state, as copies of arrays and plain values, for `restore` of a tracker of the same make."""
         core = self._core
-        pools = [{name: pool[name].copy() for name in POOL.names or ()} for pool in core.pools]
+        pools = [pool.save() for pool in core.pools]
         own = {"store": core.store.save(), "pools": pools, "counters": dict(core.counters)}
         return {**own, **{name: copy.deepcopy(getattr(core, name)) for name in _SAVED}}
 
@@ -120,7 +120,7 @@ class Tracker:
         if len(saved["clocks"]) != len(core.radars):
             raise ValueError("the saved tracks do not fit this tracker")
         core.store.restore(saved["store"])
-        core.pools = [pool_of(columns) for columns in saved["pools"]]
+        core.pools = [PlotPool.of(columns) for columns in saved["pools"]]
         core.counters.clear()
         core.counters.update(saved["counters"])
         for name in _SAVED:
@@ -158,7 +158,8 @@ WARM_TIME = 1e9
 """UTC s at which the made-up input begins."""
 
 WARM_SECTORS = 32
-"""Sectors of a made-up turn, so that plots wait for those of the next sector."""
+"""Sectors of a made-up turn, so that plots wait for those of the next sector; the last turns come whole, so that
+several marks are decided together."""
 
 
 def _made_up_report(second: int) -> TargetReports:
@@ -195,7 +196,8 @@ def _made_up_turn(site: RadarSite, turn: int) -> Iterator[SectorPlots]:
         bearing_sd=0.1,
     )
     own = azimuth / (2 * np.pi) * a
-    ends = [a * k // WARM_SECTORS for k in range(WARM_SECTORS + 1)]
+    sectors = WARM_SECTORS if turn < WARM_TURNS - 2 else 1
+    ends = [a * k // sectors for k in range(sectors + 1)]
     for low, high in pairwise(ends):
         first, last = turn * a + low, turn * a + high
         mark = marks_between(first, last, a)

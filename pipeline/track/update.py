@@ -77,15 +77,15 @@ def start_tracks(
         simulated = np.broadcast_to(simulated, (len(measured.time),))[:k]
         measured, prior = Measured(*(one[:k] for one in measured)), Prior(*(one[:k] for one in prior))
     core.filter.start(store, rows, measured, prior)
-    renew(core, rows)
+    _, moments = core.predicted(rows, store.time[made])
     first_score = 0.0
     if source != Source.RADAR:
         first_score = (1 + head_start) * core.settings.evidence.other_sensor * FIRST_SCORE
     last = [clock.decided_row(azimuths) for clock, azimuths in zip(core.clocks, core.azimuths, strict=True)]
     _found(
-        store.rows, store.evidence, store.look, store.rows[SOURCE_TIMES[source]], rows, measured.time,
-        measured.position, np.broadcast_to(simulated, (k,)), sensor, 1 + head_start, first_score,
-        np.array(last, np.int64), np.array(core.azimuths, np.int64),
+        store.rows, store.evidence, store.look, store.rows[SOURCE_TIMES[source]], rows, *moments, measured.time,
+        measured.position, np.full(k, simulated), sensor, 1 + head_start, first_score, np.array(last, np.int64),
+        np.array(core.azimuths, np.int64),
     )  # fmt: skip
     return rows
 
@@ -120,13 +120,15 @@ def _put_moments(tracks: Array, rows: Array, mean: Floats, covariance: Floats) -
 
 @allocating
 def _found(
-    tracks: Array, evidence: Array, look: Array, source_time: Floats, rows: Array, time: Floats, position: Floats,
-    simulated: Array, sensor: int, hits: int, score: float, decided: Array, azimuths: Array,
+    tracks: Array, evidence: Array, look: Array, source_time: Floats, rows: Array, mean: Floats, covariance: Floats,
+    time: Floats, position: Floats, simulated: Array, sensor: int, hits: int, score: float, decided: Array,
+    azimuths: Array,
 ) -> None:  # fmt: skip
-    """Write what is known of new tracks besides their motion. decided: absolute row of each radar's newest mark."""
+    """Write what is known of new tracks. decided: absolute row of each radar's newest mark."""
     for k in range(len(rows)):
         i = rows[k]
         one, seen = tracks[i], evidence[i, sensor]
+        one["state"][:], one["covariance"][:] = mean[k], covariance[k]
         one["updated"] = one["born"] = source_time[i] = time[k]
         one["birthplace"][:] = position[k]
         one["hits"], one["simulated"] = 1, simulated[k]

@@ -11,7 +11,7 @@ from pipeline.associate.gnn import GlobalNearestNeighbour
 from pipeline.contracts.associate import Association, Expected
 from pipeline.contracts.measured import Hypotheses, Measured
 from pipeline.kernels.assignment import assign_sparse
-from pipeline.tables.arrays import Array
+from pipeline.tables.arrays import Array, Floats
 
 
 class Option(NamedTuple):
@@ -57,6 +57,9 @@ class TwoHypotheses:
             kept[one.row].append(one)
         ended = np.array([row for row, ways in enumerate(kept) if not ways], np.int32)
         return gated._replace(hypotheses=_compressed(kept), ended=ended)
+
+    def reach(self, expected: Expected, measured: Measured) -> Floats:
+        return GlobalNearestNeighbour(self.gate, self.max_gate_m).reach(expected, measured)
 
     def _kept(self, options: list[list[Option]], plots: int) -> list[Option]:
         """One or two options of each target, given those of each in order, the best first."""

@@ -142,6 +142,31 @@ class AssociateContract:
         assert back == taken_by(whole)
         assert sum(plots != () for sets in back for plots in sets) > 5
 
+    @pytest.mark.parametrize("seed", SEEDS)
+    def test_no_pair_is_out_of_reach(self, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        tracks, plots = expected(rng, 40), measured(rng, 300)
+        answer, reach = self.ask(tracks, plots), self.part.reach(tracks, plots)
+        of = np.repeat(np.arange(40), np.diff(answer.first))
+        dt = plots.time[answer.pair] - tracks.time[of]
+        off = plots.position[answer.pair] - tracks.mean[of, :2] - dt[:, None] * tracks.mean[of, 2:]
+        assert (np.hypot(*off.T) <= reach[of] + 1e-9).all()
+        assert (reach <= self.part.max_gate_m).all()
+        assert len(of) > 20
+
+    @pytest.mark.parametrize("seed", SEEDS)
+    def test_what_is_out_of_reach_of_each_other_is_decided_apart(self, seed: int) -> None:
+        """Two crowds far from each other, asked about together and each for itself."""
+        rng = np.random.default_rng(seed)
+        tracks, plots = expected(rng, 40, 60.0), measured(rng, 50, 60.0)
+        tracks.mean[20:, :2] += 5000.0
+        plots.position[25:] += 5000.0
+        both = taken_by(self.ask(tracks, plots))
+        one = taken_by(self.ask(tracks, plots, np.arange(20), np.arange(25)))
+        other = taken_by(self.ask(tracks, plots, np.arange(20, 40), np.arange(25, 50)))
+        assert both == one + other
+        assert sum(plots != () for sets in one for plots in sets) > 3
+
     def test_what_is_given_stays_as_it_is(self) -> None:
         rng = np.random.default_rng(8)
         given = expected(rng, 30), measured(rng, 30)

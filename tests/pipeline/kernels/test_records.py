@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.kernels.records import joined, octets_of, take
+from pipeline.kernels.records import octets_of, take
 from pipeline.tables.arrays import Array
 
 KIND = np.dtype([("a", "f8", (2,)), ("b", "?"), ("c", "i4")], align=True)
@@ -28,12 +28,6 @@ def test_rows_by_index_and_by_mask() -> None:
         assert same(made, some[rows])
         made["c"] = -1
         assert (some["c"] >= 0).all()
-
-
-def test_one_after_the_other() -> None:
-    first, second = records(4, 1), records(3, 2)
-    assert same(joined(first, second), np.concatenate([first, second]))
-    assert same(joined(first[:0], second), second)
 
 
 def test_octets_are_a_view_of_whole_rows() -> None:

@@ -11,12 +11,12 @@ from pipeline.tables import MARKS_A_TURN, Plots, SectorPlots, first_mark, mark_r
 from pipeline.tables.arrays import Array
 from tests.pipeline.track.scene import T0, make_plots, split_scan
 
-AZIMUTHS = st.sampled_from([1, 7, 31, 32, 33, 45, 96, 100, 1000, 4096])
+AZIMUTHS = st.sampled_from([1, 7, 15, 16, 17, 31, 32, 33, 45, 96, 100, 1000, 4096])
 
 
 def row_of(mark: int, azimuths: int) -> int:
-    """Marks stand at the last eighth of each 32nd of a turn."""
-    return (8 * mark + 7) * azimuths // 256
+    """Marks stand at the last 16th of each 16th of a turn."""
+    return (16 * mark + 15) * azimuths // 256
 
 
 @given(st.integers(-(10**6), 10**12), AZIMUTHS)
@@ -106,18 +106,18 @@ def test_a_mark_has_the_time_of_the_first_sweep_at_its_row_or_after_it(azimuths:
     assert told == wanted
 
 
-@pytest.mark.parametrize(("missing", "marks"), [(96, range(1, 33)), (97, range(33, 33))])
+@pytest.mark.parametrize(("missing", "marks"), [(96, range(1, 17)), (97, range(17, 17))])
 def test_marks_in_a_gap_longer_than_a_turn_are_left_out(missing: int, marks: range) -> None:
-    row = np.array([missing + 3 - 96], np.int32)
-    mark, time = passed_marks(96, row, np.array([7.5]), 3, 96)
+    row = np.array([missing + 6 - 96], np.int32)
+    mark, time = passed_marks(96, row, np.array([7.5]), 6, 96)
     assert mark.tolist() == list(marks)
     assert time.tolist() == [7.5] * len(marks)
 
 
 def test_a_mark_at_the_first_row_after_a_long_gap_is_not_in_the_gap() -> None:
-    mark, time = passed_marks(10 * 96, np.array([8, 9, 10, 11], np.int32), np.arange(4.0), 3, 96)
-    assert mark.tolist() == [322, 323]
-    assert time.tolist() == [0.0, 3.0]
+    mark, time = passed_marks(10 * 96, np.arange(5, 12, dtype=np.int32), np.arange(7.0), 3, 96)
+    assert mark.tolist() == [160, 161]
+    assert time.tolist() == [0.0, 6.0]
 
 
 def test_a_source_that_knows_no_marks_gives_none() -> None:
@@ -132,5 +132,5 @@ def test_the_scene_of_the_tracker_tests_gives_the_same_marks_for_any_cut(sectors
     plots = make_plots(T0 + 3.0, [[0.0, 900.0]], 2.0)
     whole, cut = (split_scan(plots, 3, count) for count in (1, sectors))
     assert octets([(one.mark, one.mark_time) for one in cut]) == octets([(one.mark, one.mark_time) for one in whole])
-    assert whole[0].mark.tolist() == list(range(96, 128))
-    assert whole[0].mark_time.tolist() == [T0 + 3 + (8 * k + 7) / 256 for k in range(32)]
+    assert whole[0].mark.tolist() == list(range(3 * MARKS_A_TURN, 4 * MARKS_A_TURN))
+    assert whole[0].mark_time.tolist() == [T0 + 3 + (16 * k + 15) / 256 for k in range(MARKS_A_TURN)]

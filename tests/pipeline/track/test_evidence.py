@@ -19,6 +19,7 @@ from pipeline.track.plot_pool import POOL
 from pipeline.track.settings import EvidenceSettings
 from pipeline.track.store import TrackStore
 from tests.pipeline.track.scene import RADAR, A
+from tests.pipeline.track.test_false_plots import density as density_of
 
 RULE = EvidenceSettings()
 NONE = FalsePlots.around(RADAR)
@@ -90,8 +91,8 @@ def test_off_the_pavement_what_was_learnt_of_the_place_counts() -> None:
     learnt = FalsePlots.around(RADAR)
     for turn in range(40):
         learnt.turn(turn * A, A)
-        learnt.learn(np.array([[300.0, -400.0]]), np.ones(1))
-    density = float(learnt.density(np.array([[300.0, -400.0]]))[0])
+        learnt.learn(np.array([[300.0, -400.0, 1.0]]))
+    density = float(density_of(learnt, np.array([[300.0, -400.0]]))[0])
     assert density > 1e-3
     grass = plot(surface=SurfaceKind.GRASS)
     assert scored(grass, false_plots=learnt) == pytest.approx(log_likelihood_ratio(density))

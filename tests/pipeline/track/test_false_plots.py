@@ -9,9 +9,17 @@ import pytest
 
 from pipeline.airport.model import SurfaceKind
 from pipeline.tables import Plots
-from pipeline.track.false_plots import FalsePlots
+from pipeline.tables.arrays import Floats
+from pipeline.track.false_plots import REACH, FalsePlots, learnt_rate
 from pipeline.track.tracker import Tracker
 from tests.pipeline.track.scene import RADAR, A, FlatZones, Target, line, make_tracker, run, scan_plots, split_scan
+
+
+def density(made: FalsePlots, places: Floats) -> Floats:
+    """False plots a square metre and turn, as far as learnt, at places (n, 2)."""
+    cells = (places - (made.west, made.south)) / made.step - REACH
+    return np.array([learnt_rate(made.rate, x, y) for x, y in cells]) / (made.scale * made.step**2)
+
 
 GRASS = FlatZones(SurfaceKind.GRASS)
 
@@ -24,24 +32,24 @@ def test_the_density_is_that_of_the_plots_given() -> None:
     for turn in range(400):
         made.turn(turn * A, A)
         if rng.random() < 0.25:
-            made.learn(spot, np.ones(1))
-        made.learn(rng.uniform(-1000, 1000, (40, 2)), np.ones(40))
-    everywhere = made.density(rng.uniform(-900, 900, (5000, 2)))
+            made.learn(np.array([[*spot[0], 1.0]]))
+        made.learn(np.column_stack([rng.uniform(-1000, 1000, (40, 2)), np.ones(40)]))
+    everywhere = density(made, rng.uniform(-900, 900, (5000, 2)))
     assert everywhere.mean() == pytest.approx(40 / 2000**2, rel=0.15)
-    assert 0.25 / 4 / 12**2 < made.density(spot)[0] < 0.6 / 12**2
-    assert made.density(np.array([[2500.0, 0.0], [1e6, 0.0]])).tolist() == [0.0, 0.0]
+    assert 0.25 / 4 / 12**2 < density(made, spot)[0] < 0.6 / 12**2
+    assert density(made, np.array([[2500.0, 0.0], [1e6, 0.0]])).tolist() == [0.0, 0.0]
 
 
 def test_the_density_fades() -> None:
     made = FalsePlots.around(RADAR)
     made.turn(0, A)
-    made.learn(np.zeros((1, 2)), np.ones(1))
-    assert made.density(np.zeros((1, 2)))[0] == 0.0  # what is learnt counts from the next turn on
+    made.learn(np.array([[0.0, 0.0, 1.0]]))
+    assert density(made, np.zeros((1, 2)))[0] == 0.0  # what is learnt counts from the next turn on
     made.turn(A, A)
-    before = made.density(np.zeros((1, 2)))[0]
+    before = density(made, np.zeros((1, 2)))[0]
     assert before > 0.0
     made.turn(301 * A, A)
-    assert made.density(np.zeros((1, 2)))[0] < 0.02 * before
+    assert density(made, np.zeros((1, 2)))[0] < 0.02 * before
 
 
 def blinking(scans: int, zones: FlatZones) -> Tracker:

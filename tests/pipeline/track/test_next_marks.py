@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.tables import SectorPlots, mark_row, marks_between
+from pipeline.tables import MARKS_A_TURN, SectorPlots, mark_row, marks_between
 from pipeline.track.radar_clock import RadarClock
-from pipeline.track.schedule import Marks, next_marks
+from pipeline.track.schedule import Marks, next_marks, starts_half
 from tests.pipeline.track.scene import T0, A, make_plots
 
 NOTHING = make_plots([], np.empty((0, 2)), 2.0)
@@ -51,11 +51,11 @@ def test_a_batch_ends_at_the_turn_and_at_half_a_turn() -> None:
     radar = Radar()
     radar.deliver(2.5)
     made = batches([radar])
-    assert numbers(made) == [list(range(k, k + 16)) for k in range(0, 80, 16)]
+    assert numbers(made) == [list(range(k, k + 8)) for k in range(0, 40, 8)]
     radar.deliver(2.9)
     radar.deliver(3.3)
     later = batches([radar])
-    assert numbers(later) == [list(range(80, 96)), list(range(96, 105))]
+    assert numbers(later) == [list(range(40, 48)), list(range(48, 52))]
     for one in (*made, *later):
         assert one.radar == 0
         assert one.row.tolist() == mark_row(one.number, A).tolist()
@@ -66,33 +66,70 @@ def test_a_batch_ends_at_the_turn_and_at_half_a_turn() -> None:
 def test_half_a_turn_is_counted_from_the_first_mark_of_the_batch() -> None:
     radar = Radar()
     radar.deliver(0.3)
-    assert numbers(batches([radar])) == [list(range(9))]
+    assert numbers(batches([radar])) == [list(range(4))]
     radar.deliver(1.2)
-    assert numbers(batches([radar])) == [list(range(9, 25)), list(range(25, 32)), list(range(32, 38))]
+    assert numbers(batches([radar])) == [list(range(4, 12)), list(range(12, 16)), list(range(16, 19))]
 
 
-@pytest.mark.parametrize(("gap", "alone"), [(16, False), (17, True), (32, True), (320, True)])
+@pytest.mark.parametrize(("gap", "alone"), [(8, False), (9, True), (16, True), (160, True)])
 def test_the_first_mark_after_a_gap_stands_alone(gap: int, alone: bool) -> None:
     radar = Radar()
     radar.deliver(1.0)
     batches([radar])
-    mark = np.arange(31 + gap, 31 + gap + 3)
+    mark = np.arange(15 + gap, 15 + gap + 3)
     time = T0 + mark_row(mark, A) / A
     high = int(mark_row(mark[-1], A)) + 1
     radar.clock.heard(SectorPlots(0, 1, T0 + 99, A, high, NOTHING, mark=mark, mark_time=time), A, 1.0)
     assert numbers(batches([radar]))[0] == mark[: 1 if alone else 3].tolist()
 
 
-@pytest.mark.parametrize(("until", "sizes"), [(0.2, [6, 10]), (7 / 256, [1, 15]), (0.01, [1, 15]), (5.0, [16])])
-def test_a_batch_ends_where_all_tracks_are_to_be_judged(until: float, sizes: list[int]) -> None:
-    """A mark at that time still belongs to those before it; one alone is decided whatever the time."""
+def test_a_half_turn_starts_at_its_first_mark() -> None:
+    assert [mark for mark in range(2 * MARKS_A_TURN) if starts_half(mark)] == [0, 8, 16, 24]
+    for mark in (*range(2 * MARKS_A_TURN), *range(10**9 * MARKS_A_TURN, (10**9 + 1) * MARKS_A_TURN)):
+        before, half = (2 * mark_row(one, A) // A for one in (mark - 1, mark))
+        assert starts_half(mark) == (half != before)
+
+
+HALF_TURN_AT = 143 / 256
+"""s after T0 at which the mark 8 is passed, with which the second half of the first turn starts."""
+
+
+@pytest.mark.parametrize(
+    ("until", "sizes"),
+    [(0.01, [4, 8]), (0.35, [4, 8]), (HALF_TURN_AT - 1e-3, [4, 8]), (HALF_TURN_AT, [8, 4]), (5.0, [8, 4])],
+)
+def test_a_batch_ends_at_the_half_turn_where_all_tracks_are_to_be_judged(until: float, sizes: list[int]) -> None:
+    """Later marks stay with those before them until a half turn starts, and so does one at that very time."""
     radar = Radar()
-    radar.deliver(0.5)
-    clock = [radar.clock]
-    first = next_marks(clock, [A], T0 + 0.5, T0, T0 + until)
+    radar.deliver(0.3)
+    assert numbers(batches([radar])) == [[0, 1, 2, 3]]
+    radar.deliver(1.0)
+    first = next_marks([radar.clock], [A], T0 + 1.0, T0, T0 + until)
     assert first is not None
     assert len(first.number) == sizes[0]
     assert [len(one.number) for one in batches([radar])] == sizes[1:]
+
+
+def test_the_start_of_a_half_turn_is_decided_whatever_the_time() -> None:
+    radar = Radar()
+    radar.deliver(0.5)
+    batches([radar])
+    radar.deliver(1.0)
+    assert numbers(batches([radar], until=0.01)) == [list(range(8, 16))]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_however_a_radar_delivers_all_tracks_are_judged_before_the_same_mark(seed: int) -> None:
+    """It is the first after that time with which a half turn starts, and stands first in its batch."""
+    rng, radar, at = np.random.default_rng(seed), Radar(), 0.0
+    until, made = rng.uniform(0.1, 4.0), []
+    while at < 6.0:
+        at += rng.uniform(0.01, 0.9)
+        radar.deliver(at)
+        made += numbers(batches([radar], until=until))
+    assert [mark for one in made for mark in one] == list(range(radar.clock.last_mark + 1))
+    judged = min(8 * half for half in range(20) if (8 * half + 15 / 16) / 16 > until)
+    assert judged in [one[0] for one in made]
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -115,7 +152,7 @@ def test_however_several_radars_deliver_their_marks_come_in_the_order_of_their_t
     for radar, one in enumerate(radars):
         mine = [number for _, of, number in decided if of == radar]
         assert mine == list(range(len(mine)))
-        assert len(mine) > 8 / one.period * 32
+        assert len(mine) > 8 / one.period * MARKS_A_TURN
 
 
 def test_a_mark_waits_for_another_radar_until_that_has_been_decided_up_to_its_time() -> None:
@@ -127,7 +164,7 @@ def test_a_mark_waits_for_another_radar_until_that_has_been_decided_up_to_its_ti
     assert [(one.radar, one.number.tolist()) for one in batches([first, second])] == []
     second.deliver(2.26)
     made = batches([first, second])
-    assert [(one.radar, one.number.tolist()) for one in made] == [(k % 2, [63 + k // 2]) for k in range(18)]
+    assert [(one.radar, one.number.tolist()) for one in made] == [(k % 2, [31 + k // 2]) for k in range(10)]
 
 
 @pytest.mark.parametrize(("silent_for", "waits"), [(0.4, True), (1.0, True), (3.0, False)])
@@ -171,7 +208,7 @@ def test_at_the_begin_a_radar_is_waited_for_until_its_first_turn_must_have_come(
 def test_without_a_closed_mark_there_is_nothing_to_decide() -> None:
     radar = Radar()
     assert batches([radar]) == []
-    radar.deliver(0.02)
+    radar.deliver(0.058)
     assert batches([radar]) == []
-    radar.deliver(0.03)
+    radar.deliver(0.059)
     assert numbers(batches([radar])) == [[0]]

@@ -11,16 +11,13 @@ from hypothesis import strategies as st
 
 from pipeline.tables import Plots
 from pipeline.track.plot_pool import (
-    EMPTY,
     FUTURE,
     GOOD,
     LATE,
     POOL,
     STALE,
+    PlotPool,
     add_centroid_noise,
-    merged,
-    pool_of,
-    pool_plots,
 )
 from tests.pipeline.track.scene import T0, A, make_plots
 
@@ -31,7 +28,7 @@ BOUNDS = (T0 + 2.0, T0 + 5.0, 3.5 * A)
 
 
 def pooled(plots: Plots, bounds: tuple[float, float, float] = BOUNDS) -> tuple[Any, list[int]]:
-    made, found = pool_plots(plots, bounds, CLOCK, A, 1, AIRCRAFT_LENGTH)
+    made, found = PlotPool().take_in(plots, bounds, CLOCK, A, 1, AIRCRAFT_LENGTH)
     assert made.dtype == POOL
     assert len(made) == found[GOOD]
     assert found.sum() == len(plots)
@@ -151,26 +148,66 @@ def test_a_place_just_across_north_belongs_to_the_turn_nearest_to_its_time() -> 
     assert pooled(plots)[0]["row"].tolist() == [5 * A - 1, 5 * A]
 
 
+def some_records(rng: np.random.Generator, many: int) -> Any:
+    """Records of few rows, times and places, told apart by their cells."""
+    made = np.zeros(many, POOL)
+    made["row"] = rng.integers(0, 6, many)
+    made["time"], made["position"] = rng.integers(0, 3, many), rng.integers(0, 3, (many, 2))
+    made["cells"] = np.arange(many)
+    return made
+
+
+def pool_of(records: Any) -> PlotPool:
+    return PlotPool.of({name: records[name] for name in POOL.names or ()})
+
+
+def keys_of(records: Any) -> list[tuple[float, ...]]:
+    return [(one["row"], one["time"], *one["position"], one["cells"]) for one in records]
+
+
 @settings(deadline=None, derandomize=True, max_examples=60)
-@given(st.integers(0, 2**32 - 1), st.sampled_from([0, 1, 5, 100, 300]), st.sampled_from([0, 1, 5, 40, 90]))
-def test_the_pool_is_in_order_of_row_time_and_place_however_it_came(seed: int, waiting: int, fresh: int) -> None:
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0, 1, 5, 100, 300]))
+def test_the_pool_is_in_order_of_row_time_and_place_however_it_came(seed: int, many: int) -> None:
+    records = some_records(np.random.default_rng(seed), many)
+    pool = pool_of(records)
+    pool.sort()
+    assert keys_of(pool.records) == sorted(keys_of(records))
+
+
+@settings(deadline=None, derandomize=True, max_examples=30)
+@given(st.integers(0, 2**32 - 1), st.integers(0, 40))
+def test_what_is_spent_is_dropped_and_copies_are_copies(seed: int, many: int) -> None:
     rng = np.random.default_rng(seed)
-    pool = np.zeros(waiting + fresh, POOL)
-    pool["row"] = rng.integers(0, 6, len(pool))
-    pool["time"], pool["position"] = rng.integers(0, 3, len(pool)), rng.integers(0, 3, (len(pool), 2))
-    pool["cells"] = np.arange(len(pool))
-    keys = [(one["row"], one["time"], *one["position"], one["cells"]) for one in pool]
-    made = merged(pool[:waiting].copy(), pool[waiting:].copy())
-    assert [(one["row"], one["time"], *one["position"], one["cells"]) for one in made] == sorted(keys)
+    records = some_records(rng, many)
+    records["spent"] = rng.random(many) < 0.5
+    pool, rows = pool_of(records), rng.permutation(many)[: many // 2]
+    copies = pool.copies(rows)
+    assert keys_of(copies) == keys_of(records[rows])
+    copies["cells"] = -1
+    pool.drop_spent()
+    assert keys_of(pool.records) == keys_of(records[~records["spent"]])
+    pool.clear()
+    assert len(pool) == len(pool.records) == 0
+
+
+def test_the_pool_grows_with_what_comes_and_keeps_what_waits() -> None:
+    rng, pool = np.random.default_rng(1), PlotPool()
+    for _ in range(4):
+        before = keys_of(pool.records)
+        fresh, found = pool.take_in(plots_at(rng, rng.uniform(3.6 * A, 4.4 * A, 200)), BOUNDS, CLOCK, A, 1, 12.0)
+        assert len(fresh) == found[GOOD] > 150
+        assert keys_of(pool.records)[: len(before)] == before
+        pool.sort()
+    assert len(pool) > 600
+    assert keys_of(pool.records) == sorted(keys_of(pool.records))
 
 
 def test_nothing_pooled_is_nothing() -> None:
     assert pooled(make_plots([], np.empty((0, 2)), 2.0))[1] == [0] * 5
-    assert len(merged(EMPTY, EMPTY)) == 0
 
 
 def test_a_pool_is_made_of_its_columns_again() -> None:
     made, _ = pooled(plots_at(np.random.default_rng(1), [4.2 * A, 4.4 * A]))
-    again = pool_of({name: made[name].copy() for name in POOL.names or ()})
+    again = PlotPool.of(pool_of(made).save()).records
     for name in POOL.names or ():
         np.testing.assert_array_equal(again[name], made[name])

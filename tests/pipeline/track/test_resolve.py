@@ -14,8 +14,9 @@ from pipeline.contracts.measured import Hypotheses
 from pipeline.group.enclosing import enclosing_track
 from pipeline.group.split_plots import join_split_plots
 from pipeline.tables.arrays import Array
+from pipeline.track.clusters import Asked, Clusters
 from pipeline.track.plot_pool import POOL, add_centroid_noise
-from pipeline.track.resolve import Decided, resolve
+from pipeline.track.resolve import Decided, resolve, together
 
 MARGIN, CENTROID_SD = 4.0, 0.08
 
@@ -23,7 +24,7 @@ MARGIN, CENTROID_SD = 4.0, 0.08
 class Case(NamedTuple):
     """tracks: rows of expected that were asked for. sets: of each, its hypotheses as (plots, weight).
 
-    near: of each, the plots in its gate with their squared distances.
+    near: of each, the plots in its gate with their squared distances. clusters: (n,), (m,) of tracks and plots.
     """
 
     tracks: list[int]
@@ -34,6 +35,7 @@ class Case(NamedTuple):
     expected: Expected
     established: Array
     pool: Array
+    clusters: tuple[Array, Array]
 
     def answer(self) -> Association:
         every = [one for each in self.sets for one in each]
@@ -50,9 +52,12 @@ class Case(NamedTuple):
 
     def resolve(self) -> Decided:
         tracks, plots = np.array(self.tracks, np.int64), np.array(self.plots, np.int32)
-        return resolve(
-            self.answer(), tracks, self.due, plots, self.expected, self.established, self.pool, MARGIN, CENTROID_SD
-        )
+        asked = Asked(tracks, self.due, plots, 100 + tracks.astype(np.int32), 200 + plots)
+        clusters = Clusters(*(one.astype(np.int32) for one in self.clusters), np.zeros(9, np.int64), 8)
+        made = resolve(self.answer(), asked, clusters, self.expected, self.established, self.pool, MARGIN, CENTROID_SD)
+        assert made.mark.tolist() == (100 + made.track).tolist()
+        assert made.left_mark.tolist() == (200 + made.left).tolist()
+        return made
 
 
 def offsets(counts: Any) -> Array:
@@ -79,6 +84,7 @@ def case(
     return Case(
         list(range(n)) if tracks is None else tracks, sets, near, np.broadcast_to(due, (n,)).copy(),
         list(range(m)) if asked is None else asked, expected, np.broadcast_to(established, (n,)).copy(), pool,
+        (np.zeros(n, np.int32), np.zeros(m, np.int32)),
     )  # fmt: skip
 
 
@@ -153,8 +159,9 @@ def slow_twin(one: Case) -> tuple[list[Any], list[int], Array, int]:
             add_centroid_noise(pool["extent"][plot], CENTROID_SD, pool["noise"][plot])
         if used[plot] < 0.5 and plot not in contested:
             record = pool[plot]
+            near = one.established & (one.clusters[0] == one.clusters[1][plot])
             owner[plot] = enclosing_track(
-                np.array(one.tracks, np.int64), one.established, expected.time, expected.mean, expected.covariance,
+                np.array(one.tracks, np.int64), near, expected.time, expected.mean, expected.covariance,
                 expected.extent, record["time"], record["position"], record["noise"], record["extent"][0], MARGIN,
             )  # fmt: skip
             if owner[plot] < 0:
@@ -201,6 +208,8 @@ def anything(seed: int) -> Case:
         rng.uniform(-60, 60, (n, 2)), rng.uniform(-60, 60, (m, 2)), sets=sets, near=near, due=rng.random(n) < 0.7,
         established=rng.random(n) < 0.7, tracks=tracks, asked=asked, cells=rng.integers(1, 30, m),
     )  # fmt: skip
+    for column in made.clusters:
+        column[:] = rng.integers(0, 3, len(column))
     made.expected.extent[:] = np.column_stack([rng.uniform(0, 60, (n, 2)), rng.uniform(0, np.pi, n)])
     return made
 
@@ -221,3 +230,22 @@ def test_any_answer_is_resolved_as_by_the_slow_twin(seed: int) -> None:
     assert one.pool["spent"].tolist() == pool["spent"].tolist()
     for name in ("position", "extent", "noise"):
         np.testing.assert_allclose(one.pool[name], pool[name], atol=1e-9)
+
+
+def test_what_was_decided_of_several_clusters_is_in_order_of_marks_and_rows() -> None:
+    def one(track: list[int], mark: list[int], plots: list[list[int]], left: list[int], absorbed: int) -> Decided:
+        return Decided(
+            np.array(track), np.array(mark, np.int32), offsets([1] * len(track)), offsets(len(each) for each in plots),
+            np.array([plot for each in plots for plot in each], np.int32), -np.array(track, float),
+            np.array(left, np.int32), np.array([4 - plot for plot in left], np.int32),
+            np.array([each[0] if each else -1 for each in plots], np.int32), 0.5 * np.array(track), absorbed,
+        )  # fmt: skip
+
+    made = together([one([2, 5], [3, 0], [[7], []], [1, 3], 1), one([4, 6], [0, 3], [[8, 9], [2]], [0], 2)])
+    assert made.track.tolist() == [4, 5, 2, 6]
+    assert made.mark.tolist() == [0, 0, 3, 3]
+    assert [plots for each in hypotheses_of(made) for plots, _ in each] == [[8, 9], [], [7], [2]]
+    assert made.log_weight.tolist() == [-4.0, -5.0, -2.0, -6.0]
+    assert made.hit.tolist() == [8, -1, 7, 2]
+    assert made.squared.tolist() == [2.0, 2.5, 1.0, 3.0]
+    assert (made.left.tolist(), made.left_mark.tolist(), made.absorbed) == ([3, 1, 0], [1, 3, 4], 3)

@@ -10,8 +10,9 @@ import pytest
 
 from pipeline.filter.kalman import Kalman
 from pipeline.tables.arrays import Array, Floats
+from pipeline.track.plot_pool import POOL
 from pipeline.track.settings import ExtentSettings
-from pipeline.track.shape import SETTLED, extents, fill_extent, reshape
+from pipeline.track.shape import SETTLED, extents, fill_extent, shape_row, shape_rule
 from pipeline.track.store import TrackStore
 
 RULE = ExtentSettings()
@@ -37,18 +38,12 @@ def moving(speed: float, course: float, **words: Any) -> Array:
 
 def take(
     rows: Array, extent: tuple[float, float, float] = (0.0, 0.0, NAN), *, since: float = 1.0, sd: float = 0.1,
-    plot: int = 0, period: float = 1.0,
+    period: float = 1.0,
 ) -> Any:  # fmt: skip
-    """The record once it took a plot of this length and width in m and direction in degrees, `since` s after another.
-
-    Beside it lies another plot, which it did not take.
-    """
-    wrong = (71.0, 33.0, 1.234)
-    columns = np.array([(*extent[:2], math.radians(extent[2])), wrong])
-    reshape(
-        RULE, rows, np.array([0]), np.array([NOW - since]), period, np.array([NOW, NOW + 3.0]), columns,
-        np.array([sd, 0.01]), np.array([plot]),
-    )  # fmt: skip
+    """The record once it took a plot of such a length, width (m) and direction (degrees), `since` s after another."""
+    pool = np.zeros(1, POOL)
+    pool["time"], pool["extent"], pool["bearing_sd"] = NOW, (*extent[:2], math.radians(extent[2])), sd
+    shape_row(shape_rule(RULE), rows[0], NOW - since, period, pool[0])
     return rows[0]
 
 
@@ -123,13 +118,6 @@ def test_a_plot_without_an_extent_leaves_it_but_turns_the_heading() -> None:
     one = take(moving(10.0, 90.0, length=30.0, width=10.0, extent_count=4))
     assert (one["length"], one["width"], one["extent_count"]) == (30.0, 10.0, 4)
     assert degrees(one, "heading") == pytest.approx(90.0)
-
-
-def test_a_track_that_took_no_plot_stays_as_it_is() -> None:
-    rows = moving(10.0, 90.0, length=30.0, width=10.0, extent_count=4, heading=1.0)
-    before = rows.tobytes()
-    take(rows, (99.0, 9.0, 10.0), plot=-1)
-    assert rows.tobytes() == before
 
 
 def test_the_long_axis_is_that_of_the_first_sure_plot_and_then_turns_the_short_way() -> None:

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
-from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from pipeline.tables import SectorPlots, Tracks
 from pipeline.track import step
 from pipeline.track.core import Core
-from pipeline.track.plot_pool import POOL
 from pipeline.track.schedule import Marks
-from pipeline.track.step import _at_mark
 from pipeline.track.tracker import Tracker
 from tests.pipeline.track.scene import Target, assert_same_store, line, make_tracker
 from tests.pipeline.track.sensors import Antenna, antenna, blocks_of, even_cut
@@ -108,19 +103,3 @@ def test_so_does_any_cut_of_an_unsteady_turn(radars: str, cut: int) -> None:
     for column in fields(Tracks):
         mine, theirs = (np.asarray(getattr(each, column.name)) for each in (one, other))
         assert mine.tobytes() == theirs.tobytes(), column.name
-
-
-@settings(deadline=None, derandomize=True, max_examples=60)
-@given(st.integers(0, 2**32 - 1), st.integers(0, 12), st.integers(0, 12))
-def test_at_a_mark_open_looks_that_it_may_reach_meet_the_plots_before_it(seed: int, looks: int, plots: int) -> None:
-    rng = np.random.default_rng(seed)
-    near = rng.integers(90, 110, looks)
-    due, open_looks = near + rng.integers(1, 5, looks), rng.random(looks) < 0.7
-    pool = np.zeros(plots, POOL)
-    pool["row"], pool["spent"] = np.sort(rng.integers(1590, 1610, plots)), rng.random(plots) < 0.3
-    tracks, taken, mask = np.empty(looks, np.int64), np.empty(plots, np.int32), np.ones(looks, np.bool_)
-    k, j = _at_mark(near, due, open_looks, pool, 100, 1600, tracks, taken, mask)
-    reached: Any = open_looks & (near <= 100)
-    assert tracks[:k].tolist() == np.flatnonzero(reached).tolist()
-    assert mask.tolist() == (reached & (due <= 100)).tolist()
-    assert taken[:j].tolist() == np.flatnonzero((pool["row"] < 1600) & ~pool["spent"]).tolist()

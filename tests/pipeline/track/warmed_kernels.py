@@ -21,7 +21,7 @@ from pipeline.tables import NodeEvents, SectorPlots, TargetReports
 from pipeline.tables.codec import decode, encode
 from pipeline.track.tracker import Tracker
 from tests.pipeline.track.scene import T0, Target, line, make_tracker
-from tests.pipeline.track.sensors import Antenna, antenna, blocks_of, report
+from tests.pipeline.track.sensors import Antenna, antenna, blocks_of, even_cut, report
 
 SECONDS = 45
 NODE = NodeSite("n1", 0.0, 500.0, 0.0, "", "", 2.0, False)
@@ -59,7 +59,8 @@ def work(tracker: Tracker, antennas: tuple[Antenna, ...], nodes: bool, decoded: 
     rng = np.random.default_rng(3)
     targets = (CROSSING, NORTHBOUND, PARKED, LOST, BUILDING)
     for second in range(SECONDS):
-        for sector in blocks_of(antennas, targets, second, second + 1.0):
+        whole = second % 5 == 3
+        for sector in blocks_of(antennas, targets, second, second + 1.0, cut=even_cut(1 if whole else 32)):
             tracker.sector(as_received(sector) if decoded else sector)
         for one in reports(rng, second + 1.0):
             tracker.target_reports(decode(encode(one), TargetReports) if decoded else one)

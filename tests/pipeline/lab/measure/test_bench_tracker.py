@@ -14,6 +14,7 @@ from pipeline.lab.measure.stopwatch import BenchRow, Stopwatch, Work
 from pipeline.lab.measure.tracker_parts import bench_tracker_parts
 from pipeline.lab.measure.tracker_workload import Field, make_bench_tracker
 from pipeline.sites import RadarSite
+from pipeline.tables import MARKS_A_TURN
 from pipeline.track.tracker import Tracker
 
 FRAMES = np.zeros((3, 4, 4), np.uint8)
@@ -131,8 +132,9 @@ def test_sectors_are_the_turn_cut_up_and_the_same_seed_gives_the_same() -> None:
         assert np.concatenate([one.plots.east for one in pieces]).tolist() == plots.east.tolist()
         assert [one.closed_from for one in pieces[1:]] == [one.closed_to for one in pieces[:-1]]
         assert pieces[-1].closed_to == (turn + 1) * 4096
-        assert [one.mark.tolist() for one in pieces] == [[32 * turn + k] for k in range(32)]
-        assert [one.mark_time[0] for one in pieces] == [1.7e9 + turn + (8 * k + 7) / 256 for k in range(32)]
+        assert [one.mark.tolist() for one in pieces[1::2]] == [[MARKS_A_TURN * turn + k] for k in range(16)]
+        assert [one.mark_time[0] for one in pieces[1::2]] == [1.7e9 + turn + (16 * k + 15) / 256 for k in range(16)]
+        assert [len(one.mark) for one in pieces[::2]] == [0] * 16
 
 
 @pytest.mark.parametrize("count", [2, 7, 4096])
@@ -140,4 +142,4 @@ def test_the_marks_of_the_field_do_not_depend_on_the_cut(count: int) -> None:
     whole, cut = Field(5, seed=3).sectors(2, 1), Field(5, seed=3).sectors(2, count)
     for name in ("mark", "mark_time"):
         assert np.concatenate([getattr(one, name) for one in cut]).tobytes() == getattr(whole[0], name).tobytes()
-    assert whole[0].mark.tolist() == list(range(64, 96))
+    assert whole[0].mark.tolist() == list(range(2 * MARKS_A_TURN, 3 * MARKS_A_TURN))
