@@ -51,22 +51,35 @@ def _declared(kind: type[Table]) -> dict[str, Column]:
     return known
 
 
+_wants: dict[type[Any], list[tuple[str, np.dtype[Any], tuple[int, ...]]]] = {}
+
+
+def _wanted(kind: type[Table]) -> list[tuple[str, np.dtype[Any], tuple[int, ...]]]:
+    """Name, dtype and shape of a row of each column."""
+    known = _wants.get(kind)
+    if known is None:
+        known = [(name, np.dtype(one.dtype), one.shape) for name, one in _declared(kind).items()]
+        _wants[kind] = known
+    return known
+
+
 @dataclass(frozen=True, eq=False)
 class Table:
     """Equal-length numpy columns; sliced by mask, index array or slice, which keeps the kind of table."""
 
     def __post_init__(self) -> None:
-        lengths: dict[str, int] = {}
-        for name, declared in _declared(type(self)).items():
+        length = None
+        for name, dtype, shape in _wanted(type(self)):
             values = getattr(self, name)
-            if not isinstance(values, np.ndarray) or values.dtype != np.dtype(declared.dtype):
+            if not isinstance(values, np.ndarray) or values.dtype != dtype:
                 found = values.dtype.str if isinstance(values, np.ndarray) else type(values).__name__
-                raise TableError(f"{type(self).__name__}.{name}: dtype {declared.dtype} wanted, {found} found")
-            if values.shape[1:] != declared.shape or values.ndim == 0:
-                raise TableError(f"{type(self).__name__}.{name}: rows of shape {declared.shape} wanted")
-            lengths[name] = len(values)
-        if len(set(lengths.values())) > 1:
-            raise TableError(f"{type(self).__name__}: columns of different lengths {lengths}")
+                raise TableError(f"{type(self).__name__}.{name}: dtype {dtype.str} wanted, {found} found")
+            if values.shape[1:] != shape or values.ndim == 0:
+                raise TableError(f"{type(self).__name__}.{name}: rows of shape {shape} wanted")
+            if length is not None and length != len(values):
+                lengths = {one: len(getattr(self, one)) for one in _declared(type(self))}
+                raise TableError(f"{type(self).__name__}: columns of different lengths {lengths}")
+            length = len(values)
 
     @classmethod
     def columns(cls) -> dict[str, Column]:

@@ -25,6 +25,10 @@ turns."""
 HELD_BACK_TURNS = 0.5
 """Turns by which the newest sweep may be ahead of the row that is closed: a large echo that is open holds it back."""
 
+MARK_AHEAD_TURNS = 1
+"""Turns beyond the closed row, from which on the number of a mark is wrong: an open echo holds that row back by half a
+turn at most."""
+
 AHEAD_TURNS = 0.1
 """Turns by which plots may say that the antenna is ahead of the newest sweep; their times are those of centroids."""
 
@@ -156,8 +160,10 @@ class RadarClock:
             turns, passed = (number - self.last_mark) / MARKS_A_TURN, at - self.last_mark_time
             if not at <= self.newest or (self.last_mark != NO_MARK and (turns <= 0 or not passed > 0)):
                 continue
-            if mark_row(number, azimuths) > self.closed_to + MOST_TURNS * azimuths:
+            if mark_row(number, azimuths) > self.closed_to + MARK_AHEAD_TURNS * azimuths:
                 continue
+            if self.last_mark == NO_MARK:
+                self.period = nominal  # what sectors without marks told of it depends on how they were cut
             if self.last_mark != NO_MARK and turns <= MOST_TURNS:
                 self._learn(passed / turns, turns, nominal)
             self.last_mark, self.last_mark_time = number, at

@@ -95,7 +95,11 @@ def _place(tracks: Array, rows: Array, at: Floats, now: float, late: Array, stat
     many = 0
     for k in range(len(rows)):
         one = tracks[rows[k]]
-        state[k], covariance[k] = one["state"], one["covariance"]
+        x, p = one["state"], one["covariance"]
+        for i in range(4):
+            state[k, i] = x[i]
+            for j in range(4):
+                covariance[k, i, j] = p[i, j]
         if one["phase"] == COASTING and at[k] < now:
             late[many] = k
             many += 1

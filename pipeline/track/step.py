@@ -63,7 +63,7 @@ class Scan(NamedTuple):
 
 def advance_radars(core: Core, newest: float) -> None:
     """Decide at all marks that are closed, in the order of their times. newest: UTC s of the newest sweep."""
-    while True:
+    while any(len(one.mark) for one in core.clocks):
         marks = next_marks(core.clocks, core.azimuths, newest, core.began, next_housekeeping(core))
         if marks is None:
             return

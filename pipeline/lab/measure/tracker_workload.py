@@ -31,6 +31,9 @@ RANGE_STEP = 6.0
 """m between range cells of the radar, in the middle of the field."""
 
 
+TAXIWAY = int(SurfaceKind.TAXIWAY)
+
+
 class _Pavement:
     """The whole bench field is a taxiway."""
 
@@ -41,7 +44,7 @@ class _Pavement:
         return np.full(len(east), -1, np.int16)
 
     def kind(self, east: Any, north: Any) -> Array:
-        return np.full(len(east), SurfaceKind.TAXIWAY, np.uint8)
+        return np.full(len(east), TAXIWAY, np.uint8)
 
 
 class Field:
