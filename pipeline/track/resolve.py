@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.contracts.associate import Association, Expected
 from pipeline.contracts.measured import Hypotheses
-from pipeline.group.enclosing import OUTSIDE, place_within
+from pipeline.group.enclosing import OUTSIDE, farthest_within, place_within
 from pipeline.group.split_plots import join_split_plots
 from pipeline.kernels.compiled import allocating
 from pipeline.tables.arrays import Array, Floats
@@ -137,11 +137,11 @@ def _resolve(
     out_hit: Array, out_squared: Floats,
 ) -> tuple[int, int, int, int, int]:  # fmt: skip
     used, contested = _weigh(track_first, plot_first, plot, log_weight, first, pair, tracks, due, len(pool))
-    head, following = _by_cluster(of_look, tracks, established)
+    head, following, far = _by_cluster(of_look, tracks, established, extent, margin)
     owned, more_owned = np.full(len(tracks), -1, np.int32), np.full(len(plots), -1, np.int32)
     rest, absorbed = _spend(
-        used, contested, head, following, tracks, plots, mark_of_plot, of_plot, time, mean, cov, extent, pool, margin,
-        centroid_sd, owned, more_owned, left, left_mark,
+        used, contested, head, following, far, tracks, plots, mark_of_plot, of_plot, time, mean, cov, extent, pool,
+        margin, centroid_sd, owned, more_owned, left, left_mark,
     )  # fmt: skip
     members = np.empty(len(plots) + 1, np.int32)
     d = h = p = 0
@@ -186,24 +186,31 @@ def _resolve(
 
 
 @allocating
-def _by_cluster(of_look: Array, tracks: Array, established: Array) -> tuple[Array, Array]:
-    """Of the established tracks (n,): the first of each cluster, and the next of the same, -1 for none; ascending."""
+def _by_cluster(
+    of_look: Array, tracks: Array, established: Array, extent: Floats, margin: float
+) -> tuple[Array, Array, Floats]:
+    """Of the established tracks (n,): the first of each cluster, and the next of the same, -1 for none; ascending.
+
+    And the square, in m^2, of how far from its middle something may lie within the extent of each.
+    """
     most = -1
     for i in tracks:
         most = max(most, of_look[i])
     head, following = np.full(most + 2, -1, np.int32), np.full(len(tracks), -1, np.int32)
+    far = np.empty(len(tracks))
     for k in range(len(tracks) - 1, -1, -1):
         if established[tracks[k]]:
             cluster = of_look[tracks[k]]
             following[k], head[cluster] = head[cluster], k
-    return head, following
+            far[k] = farthest_within(extent[tracks[k]], margin) ** 2
+    return head, following, far
 
 
 @allocating
 def _spend(
-    used: Floats, contested: Array, head: Array, following: Array, tracks: Array, plots: Array, mark_of_plot: Array,
-    of_plot: Array, time: Floats, mean: Floats, cov: Floats, extent: Floats, pool: Array, margin: float,
-    centroid_sd: float, owned: Array, more_owned: Array, left: Array, left_mark: Array,
+    used: Floats, contested: Array, head: Array, following: Array, far: Floats, tracks: Array, plots: Array,
+    mark_of_plot: Array, of_plot: Array, time: Floats, mean: Floats, cov: Floats, extent: Floats, pool: Array,
+    margin: float, centroid_sd: float, owned: Array, more_owned: Array, left: Array, left_mark: Array,
 ) -> tuple[int, int]:  # fmt: skip
     """Spend the plots that are taken or that nobody may still take; how many are left, and in the extent of a track.
 
@@ -224,12 +231,16 @@ def _spend(
         near = head[of_plot[j]] if of_plot[j] < len(head) else -1
         while near >= 0:
             i = tracks[near]
-            ratio = place_within(
-                time[i], mean[i], cov[i], extent[i], one["time"], one["position"], one["noise"], one["extent"][0],
-                margin,
-            )  # fmt: skip
-            if ratio < best:
-                best, owner = ratio, near
+            dt = one["time"] - time[i]
+            e = one["position"][0] - mean[i, 0] - dt * mean[i, 2]
+            n = one["position"][1] - mean[i, 1] - dt * mean[i, 3]
+            if e * e + n * n <= far[near]:
+                ratio = place_within(
+                    time[i], mean[i], cov[i], extent[i], one["time"], one["position"], one["noise"], one["extent"][0],
+                    margin,
+                )  # fmt: skip
+                if ratio < best:
+                    best, owner = ratio, near
             near = following[near]
         if owner >= 0:
             absorbed += 1
