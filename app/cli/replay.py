@@ -18,7 +18,7 @@ File = Annotated[
     Path,
     typer.Argument(
         help="A journal (.mcap, or the folder of one), or radar video: .npz (scans, t), a folder of polar PNGs with a"
-        " YAML, .pcap, .pcapng."
+        " YAML, pcap, pcapng or bare ASTERIX blocks under any name, also gzipped."
     ),
 ]
 Headless = Annotated[
@@ -192,6 +192,8 @@ def _check(json: Path) -> None:
 
 
 def _describe(console: Console, recording: Recording) -> None:
+    from rich.markup import escape
+
     video = recording.site.video
     turns = "" if recording.scans is None else f"{recording.scans} turns, "
     console.print(
@@ -199,6 +201,8 @@ def _describe(console: Console, recording: Recording) -> None:
         f"a turn in {video.period_s:.3g} s",
         highlight=False,
     )
+    for note in recording.notes:
+        console.print(f"[yellow]{escape(note)}[/yellow]", highlight=False)
 
 
 def _destination(settings: Settings, radar: str | None, to: str | None) -> tuple[tuple[str, int], RadarSettings | None]:
@@ -274,7 +278,7 @@ def _send(
 
 
 def _left_out(console: Console, recording: Recording) -> None:
-    plain = ("packets", "taken", "sweeps", "scans", "summary", "fragments")
+    plain = ("packets", "taken", "sweeps", "scans", "summary", "fragments", "blocks")
     left = {name: count for name, count in recording.counters.items() if count and name not in plain}
     if left:
         console.print(f"[yellow]left out: {', '.join(f'{name} {count}' for name, count in left.items())}[/yellow]")

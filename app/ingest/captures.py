@@ -1,7 +1,11 @@
-"""Captures of CAT240 over UDP as recordings, through the same decoder and assembler as live video."""
+"""Captures of CAT240 as recordings, through the same decoder and assembler as live video.
+
+The formats are those of `app.ingest.containers.datagrams`.
+"""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -9,7 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from app.ingest.pcap import CaptureError, Datagram, datagrams
+from app.ingest.containers.datagrams import Met, datagrams
+from app.ingest.containers.packets import CaptureError, Datagram
+from app.ingest.containers.times import UNDATED, timed
 from app.ingest.recording import MAX_AZIMUTHS, Recording, RecordingError, video_format
 from pipeline.assemble import Assembler
 from pipeline.asterix.cat240_batch import CELLS, DURATION, END, FIRST_CELL, START, TIME, decode_batch
@@ -38,7 +44,22 @@ def open_capture(path: Path, site: RadarSite | None, blocks: int, port: int | No
         if not counters["sweeps"]:
             raise RecordingError(f"{path}: no radar video that fits {chosen.id} in it ({_told(counters)})")
 
-    return Recording(path, chosen, None, read, counters)
+    return Recording(path, chosen, None, read, counters, _notes(path))
+
+
+def _notes(path: Path) -> tuple[str, ...]:
+    first = next(datagrams(path, Counter()), None)
+    if first is None or not math.isnan(first.time):
+        return ()
+    return (f"no times in the file: those of the messages are taken, as of {UNDATED}",)
+
+
+def _nothing(counters: Counter[str], reasons: Mapping[str, int], met: Met, port: int | None) -> str:
+    """Why there is no video: what was left out, and what the file holds instead."""
+    left_out = Counter(reasons) + Counter({name: n for name, n in counters.items() if name != "packets"})
+    here = "" if port is None else f" of port {port}"
+    words = f"no datagrams{here}" if not reasons else "no datagram is video"
+    return "; ".join(one for one in (words, _told(left_out) if left_out else "", str(met)) if one)
 
 
 def _grown(now: Mapping[str, int], before: Counter[str]) -> dict[str, int]:
@@ -49,11 +70,11 @@ def _told(counters: Counter[str]) -> str:
     return ", ".join(f"{name} {count}" for name, count in sorted(counters.items()) if count) or "empty"
 
 
-def _batches(path: Path, port: int | None, counters: Counter[str]) -> Iterator[list[Datagram]]:
+def _batches(path: Path, port: int | None, counters: Counter[str], met: Met | None = None) -> Iterator[list[Datagram]]:
     batch: list[Datagram] = []
     try:
-        for one in datagrams(path, counters):
-            if port is not None and one.port != port:
+        for one in timed(datagrams(path, counters, met)):
+            if port is not None and one.port is not None and one.port != port:
                 counters["other_port"] += 1
                 continue
             batch.append(one)
@@ -80,16 +101,15 @@ def _radar_of(path: Path, port: int | None) -> RadarSite:
     """What the first messages of a capture say about the radar."""
     parts: list[NDArray[np.int64]] = []
     reasons: dict[str, int] = {}
-    for batch in _batches(path, port, Counter()):
+    counters, met = Counter[str](), Met()
+    for batch in _batches(path, port, counters, met):
         rows, lengths, _ = _rows(batch)
         parts += [one.fields for one, _ in decode_batch(rows, lengths, reasons)]
         if sum(map(len, parts)) >= 20_000:
             break
     fields = np.concatenate(parts) if parts else np.zeros((0, 10), np.int64)
     if not len(fields):
-        raise RecordingError(
-            f"{path}: no CAT240 video in it ({_told(Counter(reasons)) if reasons else 'no datagrams'})"
-        )
+        raise RecordingError(f"{path}: no CAT240 video in it ({_nothing(counters, reasons, met, port)})")
     width = float(np.median((fields[:, END] - fields[:, START]) & 0xFFFF))
     steps = np.diff(fields[:, START]) & 0xFFFF
     steps = steps[(steps > 0) & (steps < 0x4000)]

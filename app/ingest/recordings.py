@@ -4,7 +4,8 @@
 seconds at which each turn began. Optional numbers beside them: `range_step_m`, `first_range_m`, `beamwidth_deg`,
 `db_per_step`, `bits`.
 
-A folder of polar PNGs, see `app.ingest.polar_images`; `.pcap` and `.pcapng` of CAT240, see `app.ingest.captures`.
+A folder of polar PNGs, see `app.ingest.polar_images`; captures and bare files of CAT240, see `app.ingest.captures`.
+What a file is, its octets say; its name decides nothing.
 
 bits: how many bits of each 8-bit value are used; fewer than 8 are stretched to 0..255. Without it, values that do not
 pass 15 in the whole first turn are taken for 4-bit.
@@ -53,12 +54,10 @@ def open_recording(
     try:
         if path.is_dir():
             made = open_images(path, blocks_per_scan)
-        elif path.suffix == ".npz":
+        elif _is_zip(path):
             made = _npz(path, blocks_per_scan)
-        elif path.suffix in (".pcap", ".pcapng", ".cap"):
-            return open_capture(path, site, blocks_per_scan, port)
         else:
-            raise RecordingError(f"{path}: neither .npz, .pcap, .pcapng nor a folder of PNG files")
+            return open_capture(path, site, blocks_per_scan, port)
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}") from error
     if site is None:
@@ -70,6 +69,11 @@ def open_recording(
             f"{wanted.ranges}"
         )
     return replace(made, site=site)
+
+
+def _is_zip(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(2) == b"PK"
 
 
 def _npz(path: Path, blocks: int) -> Recording:

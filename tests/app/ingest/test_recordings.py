@@ -4,7 +4,6 @@ import socket
 import struct
 import sys
 import zipfile
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from app.cli import app
-from app.ingest.pcap import CaptureError, datagrams
+from app.ingest.containers.packets import CaptureError
 from app.ingest.recordings import Recording, RecordingError, open_recording
 from app.ingest.replay import Replayer, datagrams_of
 from app.ingest.udp import VideoReceiver
@@ -25,6 +24,7 @@ from pipeline.asterix.cat240 import encode_sweeps
 from pipeline.sites import RadarSite
 from pipeline.tables import Sweeps, VideoFormat
 from tests.app.ingest.test_udp import until
+from tests.support.capture_files import ETHERNET, ipv4, ipv6, pcap, pcapng
 
 TURNS, AZIMUTHS, RANGES = 3, 64, 40
 T0 = 1_700_000_000.0
@@ -39,51 +39,6 @@ def video_of(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     cells = np.concatenate([one.amplitude for one in blocks]).reshape(-1, AZIMUTHS, recording.site.video.ranges)
     assert [one.scan for one in blocks if one.last] == list(range(len(cells)))
     return cells, np.concatenate([one.time for one in blocks])
-
-
-def ipv4(payload: bytes, *, port: int = 8600, proto: int = 17, cut: int = 0) -> list[bytes]:
-    """IPv4 packets of one UDP datagram, in fragments of `cut` octets when it is longer."""
-    data = struct.pack(">HHHH", 4000, port, 8 + len(payload), 0) + payload
-    size = cut or len(data)
-    packets = []
-    for at in range(0, len(data), size):
-        piece = data[at : at + size]
-        field = at // 8 | (0x2000 if at + size < len(data) else 0)
-        head = struct.pack(">BBHHHBBH8s", 0x45, 0, 20 + len(piece), 7, field, 9, proto, 0, bytes(range(8)))
-        packets.append(head + piece)
-    return packets
-
-
-def ipv6(payload: bytes) -> bytes:
-    data = struct.pack(">HHHH", 4000, 8600, 8 + len(payload), 0) + payload
-    hop = b"\x11\x00" + bytes(6)
-    return struct.pack(">IHBB32s", 6 << 28, len(data) + 8, 0, 64, bytes(32)) + hop + data
-
-
-ETHERNET = bytes(12) + b"\x08\x00"
-
-
-def pcap(frames: list[tuple[float, bytes]], link: int = 1, order: str = "<", nano: bool = False) -> bytes:
-    magic = 0xA1B23C4D if nano else 0xA1B2C3D4
-    out = struct.pack(order + "IHHiIII", magic, 2, 4, 0, 0, 65535, link)
-    for time, frame in frames:
-        fraction = round(time % 1 * (1e9 if nano else 1e6))
-        out += struct.pack(order + "IIII", int(time), fraction, len(frame), len(frame)) + frame
-    return out
-
-
-def pcapng(frames: list[tuple[float, bytes]], link: int = 1, order: str = "<") -> bytes:
-    def block(kind: int, body: bytes) -> bytes:
-        size = 12 + len(body)
-        return struct.pack(order + "II", kind, size) + body + struct.pack(order + "I", size)
-
-    out = block(0x0A0D0D0A, struct.pack(order + "IHHq", 0x1A2B3C4D, 1, 0, -1))
-    out += block(1, struct.pack(order + "HHI", link, 0, 0) + struct.pack(order + "HHB3xHH", 9, 1, 9, 0, 0))
-    for time, frame in frames:
-        ticks = round(time * 1e9)
-        body = struct.pack(order + "IIIII", 0, ticks >> 32, ticks & 0xFFFFFFFF, len(frame), len(frame)) + frame
-        out += block(6, body + bytes(-len(body) % 4))
-    return out
 
 
 def cat240() -> list[tuple[float, bytes]]:
@@ -271,15 +226,6 @@ def test_a_capture_comes_back(tmp_path: Path, link: int, kind: str) -> None:
     assert recording.counters["lost"] == 0
 
 
-def test_fragments_are_put_together_in_any_order(tmp_path: Path) -> None:
-    pieces = [ETHERNET + one for one in ipv4(bytes(range(250)) * 8, cut=400)]
-    frames = [(T0, one) for one in [*pieces[::-1], *pieces[:3]]]
-    counters: Counter[str] = Counter()
-    (found,) = datagrams(written(tmp_path / "a.pcap", pcap(frames)), counters)
-    assert found.payload == bytes(range(250)) * 8
-    assert (counters["fragments"], counters["fragments_lost"]) == (len(pieces) + 3, 1)
-
-
 def test_what_is_not_video_is_counted(tmp_path: Path) -> None:
     noise = [
         ETHERNET + ipv4(b"x", proto=6)[0], ETHERNET[:12] + b"\x08\x06" + bytes(28), ETHERNET, b"", ETHERNET + b"\x45",
@@ -303,8 +249,8 @@ def test_a_capture_that_was_killed_gives_what_is_there(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "octets", "says"),
     [
-        ("a.pcap", b"", "neither pcap"),
-        ("a.pcap", b"hello, world", "neither pcap"),
+        ("a.pcap", b"", "empty"),
+        ("a.pcap", b"hello, world", "neither .npz, pcap, pcapng .*68 65 6c 6c"),
         ("a.pcap", CAPTURE[:20], "header"),
         ("a.pcap", CAPTURE[:24], "no CAT240"),
         ("a.pcap", CAPTURE[:24] + b"\xff" * 40, "damaged"),
