@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.ingest.recording import RecordingError, number_of, turns_of, video_format
+from app.ingest.recording import RecordingError, in_seconds, number_of, turns_of, video_format
 from pipeline.lab.evaluate import RecordedVideo
 
 
@@ -34,9 +34,9 @@ def recorded_video(path: Path) -> RecordedVideo:
         raise RecordingError(f"{path}: not a readable npz of scans and t ({error})") from error
     if scans.dtype not in (np.uint8, np.uint16) or scans.ndim != 3 or not scans.size:
         raise RecordingError(f"{path}: scans must be uint8 or uint16 of 3 dimensions, not {scans.dtype} {scans.shape}")
-    if time.shape != (len(scans),) or time.dtype.kind not in "fiu":
+    if time.shape != (len(scans),) or time.dtype.kind not in "fiuM":
         raise RecordingError(f"{path}: t must have one time for each of {len(scans)} scans")
-    begin, _, usual = turns_of(path, time.astype(np.float64), None)
+    begin, _, usual = turns_of(path, in_seconds(time)[0], None)
     top = int(scans.max())
     bits = int(number_of(path, words, "bits", _bits(top, scans.dtype.itemsize), 1))
     if bits > 8 * scans.dtype.itemsize or top >> bits:

@@ -14,11 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.contract import Refused
-from pipeline.assemble.bit_depth import to_octets
+from app.ingest.wire_json import EARLIEST, LATEST
 from pipeline.sites import RadarSite
 from pipeline.tables import Sweeps, VideoFormat
 
 MAX_AZIMUTHS, MAX_RANGES, MAX_CELLS = 65536, 16384, 1 << 27
+
+
+SHORTEST_TURN_S, LONGEST_TURN_S = 0.02, 120.0
+"""Turns of an antenna that are believed: an air defence radar takes 12 s, a surface movement radar 1 s."""
 
 
 class RecordingError(Refused):
@@ -68,18 +72,28 @@ def turns_of(
     if len(steps) and steps.min() <= 0:
         raise RecordingError(f"{path}: time steps back after turn {int(np.argmin(steps > 0))}")
     usual = period if period is not None else (float(np.median(steps)) if len(steps) else 1.0)
+    if not SHORTEST_TURN_S <= usual <= LONGEST_TURN_S:
+        raise RecordingError(
+            f"{path}: no radar turns once in {usual:g} s ({SHORTEST_TURN_S:g} to {LONGEST_TURN_S:g} s are believed): "
+            "times and period must be in seconds"
+        )
     # a turn that was not recorded must not slow down the one before it
     periods = np.append(np.where(steps > 1.5 * usual, usual, steps), usual)
     return times, periods, usual
 
 
-def stretch_table(path: Path, bits: int | None, turn: NDArray[np.uint8]) -> tuple[int, NDArray[np.uint8]]:
-    """(bits, table of 256 values): bits as given or as the first turn says."""
-    used = bits if bits is not None else (4 if int(turn.max(initial=0)) <= 15 else 8)
-    if not 1 <= used <= 8:
-        raise RecordingError(f"{path}: bits must be 1 to 8, not {used}")
-    top = (1 << used) - 1
-    return used, to_octets(np.minimum(np.arange(256), top).astype(np.uint8), used)
+def in_seconds(times: NDArray[Any]) -> tuple[NDArray[np.float64], str]:
+    """(UTC seconds of times, what they were taken for or ""): numpy's own dates, or numbers so large that they can
+    only be milli-, micro- or nanoseconds since 1970.
+    """
+    if times.dtype.kind == "M":
+        return times.astype("datetime64[ns]").astype(np.int64) / 1e9, "times are dates of numpy, taken as UTC"
+    seconds = times.astype(np.float64)
+    for power, unit in ((3, "milliseconds"), (6, "microseconds"), (9, "nanoseconds")):
+        smaller = seconds / 10.0**power
+        if len(seconds) and bool(((smaller >= EARLIEST) & (smaller < LATEST)).all()):
+            return smaller, f"times are in {unit}, taken as such"
+    return seconds, ""
 
 
 def video_format(path: Path, shape: tuple[int, int], period: float, words: Mapping[str, Any]) -> VideoFormat:
@@ -107,15 +121,3 @@ def number_of(path: Path, words: Mapping[str, Any], name: str, default: float, l
     if not math.isfinite(value) or value < least or value > 1e6:
         raise RecordingError(f"{path}: {name} {value:g} is out of range")
     return value
-
-
-def stretched_turn(
-    path: Path, scan: int, turn: NDArray[np.uint8], bits: int, table: NDArray[np.uint8], begin: float, period: float,
-    blocks: int,
-) -> Iterator[Sweeps]:  # fmt: skip
-    """blocks_of_turn, with values of fewer bits stretched. Raises RecordingError when a value has more."""
-    if bits < 8:
-        if int(turn.max(initial=0)) >> bits:
-            raise RecordingError(f"{path}: turn {scan} has values of more than {bits} bits; say `bits: 8`")
-        turn = table[turn]
-    yield from blocks_of_turn(scan, turn, float(begin), float(period), blocks)

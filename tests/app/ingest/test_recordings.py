@@ -1,5 +1,6 @@
 """Recordings: what was recorded comes back, and damaged files end in one clear error."""
 
+import gzip
 import socket
 import struct
 import sys
@@ -24,7 +25,7 @@ from pipeline.asterix.cat240 import encode_sweeps
 from pipeline.sites import RadarSite
 from pipeline.tables import Sweeps, VideoFormat
 from tests.app.ingest.test_udp import until
-from tests.support.capture_files import ETHERNET, ipv4, ipv6, pcap, pcapng
+from tests.support.capture_files import ETHERNET, block, ipv4, ipv6, pcap, pcapng
 
 TURNS, AZIMUTHS, RANGES = 3, 64, 40
 T0 = 1_700_000_000.0
@@ -104,7 +105,7 @@ def test_four_bit_values_are_stretched(tmp_path: Path) -> None:
         ({"scans": VIDEO, "t": np.arange(2.0)}, "one time"),
         ({"scans": VIDEO, "t": np.array([0.0, 2.0, 1.0])}, "steps back"),
         ({"scans": VIDEO, "t": np.array([0.0, np.nan, 1.0])}, "finite"),
-        ({"scans": VIDEO.astype(float), "t": np.arange(3.0)}, "uint8"),
+        ({"scans": VIDEO.astype(complex), "t": np.arange(3.0)}, "uint8"),
         ({"scans": VIDEO[0], "t": np.arange(3.0)}, "dimensions"),
         ({"scans": VIDEO[:, :4], "t": np.arange(3.0)}, "4 azimuths"),
         ({"scans": VIDEO, "t": np.arange(3.0), "range_step_m": np.inf}, "range_step_m"),
@@ -186,7 +187,7 @@ def test_images_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     Image.fromarray(VIDEO[0][:, :30]).save(folder / "0002.png")
     with pytest.raises(RecordingError, match="first image"):
         video_of(open_recording(folder))
-    Image.new("RGB", (40, 64)).save(folder / "0002.png")
+    Image.new("RGB", (40, 64), "red").save(folder / "0002.png")
     with pytest.raises(RecordingError, match="RGB"):
         video_of(open_recording(folder))
     (folder / "more.yaml").write_text("")
@@ -282,6 +283,10 @@ def npz_octets() -> bytes:
 
 
 SEEDS = {
+    "a.ast": b"".join(one for _, one in cat240()[:30]),
+    "a.pcap.gz": gzip.compress(CAPTURE[:4000]),
+    "simple.pcapng": pcapng([])
+    + b"".join(block(3, struct.pack("<I", len(one) + 42) + ETHERNET + ipv4(one)[0]) for _, one in cat240()[:30]),
     "a.npz": npz_octets(),
     "a.pcap": CAPTURE[:4000],
     "a.pcapng": pcapng([(t, ETHERNET + ipv4(one, cut=64)[0]) for t, one in cat240()[:30]]),
