@@ -192,17 +192,16 @@ def _check(json: Path) -> None:
 
 
 def _describe(console: Console, recording: Recording) -> None:
-    from rich.markup import escape
-
     video = recording.site.video
     turns = "" if recording.scans is None else f"{recording.scans} turns, "
     console.print(
         f"{recording.path}: {turns}{video.azimuths} azimuths of {video.ranges} cells of {video.range_step_m:.3g} m, "
         f"a turn in {video.period_s:.3g} s",
         highlight=False,
+        markup=False,
     )
     for note in recording.notes:
-        console.print(f"[yellow]{escape(note)}[/yellow]", highlight=False)
+        console.print(note, style="yellow", highlight=False, markup=False)
 
 
 def _destination(settings: Settings, radar: str | None, to: str | None) -> tuple[tuple[str, int], RadarSettings | None]:

@@ -48,7 +48,7 @@ def open_capture(path: Path, site: RadarSite | None, blocks: int, port: int | No
 
 
 def _notes(path: Path) -> tuple[str, ...]:
-    first = next(datagrams(path, Counter()), None)
+    first = next(_found(path, Counter()), None)
     if first is None or not math.isnan(first.time):
         return ()
     return (f"no times in the file: those of the messages are taken, as of {UNDATED}",)
@@ -72,21 +72,25 @@ def _told(counters: Counter[str]) -> str:
 
 def _batches(path: Path, port: int | None, counters: Counter[str], met: Met | None = None) -> Iterator[list[Datagram]]:
     batch: list[Datagram] = []
+    for one in timed(_found(path, counters, met)):
+        if port is not None and one.port is not None and one.port != port:
+            counters["other_port"] += 1
+            continue
+        batch.append(one)
+        if len(batch) == BATCH:
+            yield batch
+            batch = []
+    if batch:
+        yield batch
+
+
+def _found(path: Path, counters: Counter[str], met: Met | None = None) -> Iterator[Datagram]:
     try:
-        for one in timed(datagrams(path, counters, met)):
-            if port is not None and one.port is not None and one.port != port:
-                counters["other_port"] += 1
-                continue
-            batch.append(one)
-            if len(batch) == BATCH:
-                yield batch
-                batch = []
+        yield from datagrams(path, counters, met)
     except CaptureError as error:
         raise RecordingError(str(error)) from error
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}") from error
-    if batch:
-        yield batch
 
 
 def _rows(batch: list[Datagram]) -> tuple[NDArray[np.uint8], NDArray[np.int32], NDArray[np.float64]]:

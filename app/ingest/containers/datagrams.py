@@ -112,8 +112,8 @@ def _unpacked(path: Path) -> Iterator[BinaryIO]:
 
 def _beginning(path: Path) -> bytes:
     """As many octets as recognise any format, or all that there are."""
-    head = b""
+    head = bytearray()
     with _unpacked(path) as file, suppress(EOFError):
         while len(head) < blocks.LOOKED_AT and (more := file.read(1 << 12)):
             head += more
-    return head
+    return bytes(head)

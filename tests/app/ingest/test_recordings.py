@@ -268,6 +268,12 @@ def test_files_of_another_kind_are_refused_by_name(tmp_path: Path, name: str, oc
     assert name in str(caught.value)
 
 
+def test_a_file_that_is_no_recording_is_refused_though_its_radar_is_known(tmp_path: Path) -> None:
+    site = RadarSite("smr", 0, 0, 0, VideoFormat(azimuths=64, ranges=40, range_step_m=3.0, first_range_m=0.0))
+    with pytest.raises(RecordingError, match=r"a\.txt: neither"):
+        list(open_recording(written(tmp_path / "a.txt", b"hello"), site=site).blocks())
+
+
 def test_a_missing_file_is_refused_by_name(tmp_path: Path) -> None:
     for name in ("no.npz", "no.pcap", "no"):
         with pytest.raises(RecordingError, match=name):
