@@ -42,7 +42,7 @@ class _Open:
 @dataclass
 class _Sender:
     """begun: datagrams so far. recent: identification -> number of the last MAX_BETWEEN. done: the same -> the pieces,
-    by hash, of those that were whole. again: identifications come again while they are among these.
+    by hash, of those that were whole. again: the last to begin had an identification that was among these.
     """
 
     begun: int = 0
@@ -73,7 +73,7 @@ class Fragments:
         sender = self._sender(addresses)
         key = addresses, identification
         one = self._open.get(key)
-        if one is not None and one.pieces.get(offset) == data and not (sender.again and offset == 0):
+        if one is not None and one.pieces.get(offset) == data:
             self._counters["fragments_double"] += 1
             return None
         if one is not None and _of_another(one, sender, offset, time, data, more):
@@ -104,7 +104,7 @@ class Fragments:
     def _begin(self, key: tuple[bytes, bytes], sender: _Sender, time: float) -> _Open:
         identification = key[1]
         sender.begun += 1
-        sender.again = identification in sender.recent or (sender.again and len(sender.recent) < MAX_BETWEEN)
+        sender.again = identification in sender.recent
         sender.done.pop(identification, None)
         sender.recent[identification] = sender.begun
         sender.recent.move_to_end(identification)

@@ -24,8 +24,13 @@ def test_simple_packet_blocks_are_read_and_have_no_time(tmp_path: Path, order: s
 
 
 def test_a_simple_packet_block_holds_no_more_than_its_interface_keeps(tmp_path: Path) -> None:
-    for kept, name in ((len(FRAME), ""), (40, "snapped")):
-        octets = section() + interface(kept=kept) + block(3, struct.pack("<I", len(FRAME) + 99) + FRAME[:kept])
+    for kept, there, name in (
+        (len(FRAME), len(FRAME), ""),
+        (0, len(FRAME), ""),
+        (40, 40, "snapped"),
+        (0, 40, "snapped"),
+    ):
+        octets = section() + interface(kept=kept) + block(3, struct.pack("<I", len(FRAME) + 99) + FRAME[:there])
         found, counted, _ = read(tmp_path / "a", octets)
         assert len(found) == (not name)
         assert counted == {"packets": 1} | ({name: 1} if name else {})
