@@ -31,6 +31,9 @@ _Integer64 = BigInteger().with_variant(Integer, "sqlite")
 _Key = _Integer64
 """SQLite numbers rows by itself only where the type is spelt INTEGER."""
 
+_Address = String(7).with_variant(String(6), "sqlite")
+"""SQLite's texts have any length, so that a column of an earlier version need not be made anew."""
+
 tracks = Table(
     "tracks",
     metadata,
@@ -43,7 +46,7 @@ tracks = Table(
     Column("last_time", Double, nullable=False),
     Column("category", SmallInteger, nullable=False),
     Column("callsign", String(8)),
-    Column("address", String(6)),
+    Column("address", _Address),
     Column("simulated", Boolean, nullable=False),
     Column("number", Integer),
     Index("ix_tracks_number", "airport", "track_id", "last_time"),

@@ -8,7 +8,8 @@ Layout, little endian, every part padded with zeros to a multiple of 8 octets:
 
 The fingerprint is the CRC-32 of the declaration (name, dtype and row shape of every column), so that octets written for
 another declaration are refused and never read as something else, but for one case: octets written before a table got
-further columns, or before integer columns got wider, are read when each further column has a default, which it takes.
+further columns, before integer columns got wider, or before text columns got one character more, are read when each
+further column has a default, which it takes.
 """
 
 from __future__ import annotations
@@ -36,6 +37,9 @@ VERSION = 1
 
 ALIGNMENT = 8
 """Octets; the greatest item of a column is 8 octets, so that columns can be used where they lie."""
+
+UTF32_OCTETS = 4
+"""Octets of one character of a text column."""
 
 GREATEST_CODE_POINT = 0x10FFFF
 """Of Unicode; a UTF-32 unit above it is no text."""
@@ -74,8 +78,10 @@ class _Field:
     """What the fingerprint is made of."""
 
     def narrower(self) -> list[_Field]:
-        """The same column with each integer type of the same sign that has fewer octets."""
+        """The same column with each integer type of the same sign that has fewer octets, or with one character less."""
         kind, size = self.native.kind, self.native.itemsize
+        if kind == "U" and size > UTF32_OCTETS:
+            return [_field(self.name, f"U{size // UTF32_OCTETS - 1}", self.shape, self.default)]
         if kind not in "iu":
             return []
         return [_field(self.name, f"{kind}{octets}", self.shape, self.default) for octets in (1, 2, 4) if octets < size]
@@ -116,7 +122,7 @@ def encode(table: Table) -> bytes:
 def decode(data: Octets, kind: type[T] | None = None, *, copy: bool = False) -> T:
     """The table of a byte form. kind: the table wanted; None: whichever the octets name.
 
-    Columns that were not yet written take their default, and integers that were written narrower become wider.
+    Columns that were not yet written take their default; integers and texts that were written narrower become wider.
     copy: the columns are writable and own their octets; otherwise they are read-only views of `data` wherever the
     alignment allows. Raises CodecError for everything that is not exactly the byte form of one such table, and of these
     OtherColumnsError for tables and columns that this version does not declare.

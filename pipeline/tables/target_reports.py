@@ -21,7 +21,10 @@ class TargetReports(Table):
     """One row a report."""
 
     time: Array = column("f8", "s", "UTC of applicability of the position")
-    address: Array = column("U6", "", "24-bit address as six lower-case hex digits; empty when unknown", default="")
+    address: Array = column(
+        "U7", "", "24-bit address as six lower-case hex digits, '~' before one not of ICAO; empty when unknown",
+        default="",
+    )  # fmt: skip
     callsign: Array = column("U8", "", "flight or vehicle identification; empty when unknown", default="")
     east: Array = column("f8", "m", "east of the airport's reference point")
     north: Array = column("f8", "m", "north of the airport's reference point")
@@ -35,4 +38,7 @@ class TargetReports(Table):
     arrival: Array = column("f8", "s", "UTC when it arrived at this host; nan when unknown", default=float("nan"))
     source: Array = column(
         "U16", "", "name of the sensor or feed that the report came through; empty when unknown", default=""
+    )
+    ground_known: Array = column(
+        "?", "", "whether the sender says if it is on the ground; otherwise on_ground means nothing", default=True
     )

@@ -54,7 +54,7 @@ class Tracks(Table):
     altitude: Array = column("f4", "m", "height above the airport; nan when unknown", default=float("nan"))
     on_ground: Array = column("?", "", "held to be on the ground", default=True)
     category: Array = column("u1", "", "TargetClass", default=0)
-    address: Array = column("U6", "", "24-bit address; empty when unknown", default="")
+    address: Array = column("U7", "", "24-bit address, '~' before one not of ICAO; empty when unknown", default="")
     callsign: Array = column("U8", "", "flight or vehicle identification; empty when unknown", default="")
     sources: Array = column("u1", "", "Source flags", default=0)
     simulated: Array = column("?", "", "rests on simulated input", default=False)

@@ -41,6 +41,10 @@ what may be wrong with a track (ANTENNA_SD)."""
 PART_TIME_SD = 0.3
 """s, by which a track's velocity is not that of the time between a plot and a report: it brakes and turns."""
 
+GROUND_ALTITUDE = 15.0
+"""m above the airport up to which a target that does not say whether it is on the ground is held to be there: what the
+slope of an airport and the error of a pressure altitude leave open."""
+
 WINDOW_LAGS = 2.0
 """Longest allowed lags by which a report's time may differ from that at which tracks are expected."""
 
@@ -267,10 +271,13 @@ def _describe(core: Core, reports: TargetReports, row: Array) -> None:
     """Write what reports say of tracks besides their position."""
     store = core.store
     store.misfit_reports[row] = 0
-    store.on_ground[row] = reports.on_ground
     heard = np.isfinite(reports.altitude)
+    low = heard & (reports.altitude <= GROUND_ALTITUDE)
+    told = reports.ground_known | heard
+    on_ground = np.where(reports.ground_known, reports.on_ground, low)
+    store.on_ground[row[told]] = on_ground[told]
     store.altitude[row[heard]] = reports.altitude[heard]
-    store.altitude[row[~heard & reports.on_ground]] = np.nan
+    store.altitude[row[~heard & told & on_ground]] = np.nan
     named = reports.address != ""
     store.address[row[named]] = reports.address[named]
     store.named[row[named]] = True

@@ -26,6 +26,12 @@ _FACTS = {"misses": "i4", "length": "f4", "width": "f4", "heading": "f4", "sourc
 COURSE_SPEED = 2.0
 """m/s, above which the direction of motion is told as heading; below it is noise."""
 
+OVERHEAD = 45.0
+"""m above the airport beyond which a target flies over what is below it, as in the rules of the alerts."""
+
+NOWHERE = -1
+"""Index of no zone and no runway."""
+
 MEMORY_TURNS = 2.0
 """Turns of the slowest radar for which the contribution of a sensor is shown at least."""
 
@@ -55,12 +61,16 @@ def reported_tracks(core: Core, time: float | None = None) -> Tracks:
     _describe(
         store.rows, store.evidence, rows, state, len(core.radars), core.time - memory, *made.values(),
     )  # fmt: skip
+    zone, runway = core.zones.zone(state[:, 0], state[:, 1]), core.zones.runway(state[:, 0], state[:, 1])
+    above = ~made["on_ground"] & (made["altitude"] > OVERHEAD)
+    if above.any():
+        zone, runway = np.where(above, NOWHERE, zone), np.where(above, NOWHERE, runway)
     return Tracks(
         time=at,
         state=state,
         covariance=covariance,
-        zone=core.zones.zone(state[:, 0], state[:, 1]),
-        runway=core.zones.runway(state[:, 0], state[:, 1]),
+        zone=zone,
+        runway=runway,
         address=store.address[rows],
         callsign=store.callsign[rows],
         **made,

@@ -48,7 +48,7 @@ TRACK: Mapping[str, Column] = {
     "category": Column("u1"),
     "claimed": Column("u1"),
     "named": Column("?"),
-    "address": Column("U6", (), ""),
+    "address": Column("U7", (), ""),
     "callsign": Column("U8", (), ""),
     "misfit_reports": Column("i4"),
     "radar_time": Column("f8", (), NEVER),

@@ -13,8 +13,8 @@ def other_form(saved: Any, own: Any, path: str = "") -> str | None:
     """The first place where `saved` is built otherwise than `own`, in words; None when it is built alike.
 
     own: a state that this version made. Compares the names in mappings, the classes of values, and the dtypes and row
-    shapes of arrays; never numbers, texts, lengths, or what stands where `own` is empty or None. In lists and tuples
-    the members that both have are compared in pairs.
+    shapes of arrays; never numbers, texts, lengths, or what stands where `own` is empty or None. A column of shorter
+    texts fits one of longer texts. In lists and tuples the members that both have are compared in pairs.
     """
     if own is None or saved is None:
         return None
@@ -47,7 +47,8 @@ def _mapping(saved: Mapping[Any, Any], own: Mapping[Any, Any], path: str) -> str
 
 
 def _array(saved: np.ndarray[Any, Any], own: np.ndarray[Any, Any], path: str) -> str | None:
-    if saved.dtype == own.dtype and saved.shape[1:] == own.shape[1:] and saved.ndim == own.ndim:
+    texts = saved.dtype.kind == own.dtype.kind == "U" and saved.dtype <= own.dtype
+    if (texts or saved.dtype == own.dtype) and saved.shape[1:] == own.shape[1:] and saved.ndim == own.ndim:
         return None
     return f"{path} has rows of {saved.dtype} {list(saved.shape[1:])}, here {own.dtype} {list(own.shape[1:])}"
 

@@ -174,6 +174,11 @@ def test_unsigned_integers_stay_positive_when_they_become_wider() -> None:
     assert decode(older_table(tracks, dtypes={"number": "|u1"}), Tracks).number.tolist() == [255, 0]
 
 
+def test_texts_that_were_written_one_character_shorter_are_read() -> None:
+    reports = table_of(TargetReports, 3, 7).replace(address=["4b1815", "", "abcdef"])
+    assert same_bits(decode(older_table(reports, dtypes={"address": "<U6"})), reports)
+
+
 def test_columns_are_added_and_widened_at_once_in_a_table_of_rows() -> None:
     tracks = table_of(Tracks, 4, 8).replace(id=np.arange(4), hits=7, number=0, sources=0)
     data = older_table(tracks, ("number", "sources"), {"id": "<i4", "hits": "<i2"})
@@ -194,7 +199,7 @@ def test_columns_are_added_and_widened_at_once_in_a_table_of_rows() -> None:
     ],
 )
 def test_other_declarations_are_refused(without: tuple[str, ...], dtypes: dict[str, str]) -> None:
-    """No default, narrower reals or texts, wider integers, another sign, more than MOST_CHANGES."""
+    """No default, narrower reals, much shorter texts, wider integers, another sign, more than MOST_CHANGES."""
     data = older_table(table_of(Tracks, 1, 9).replace(callsign="", id=1, zone=1, time=1.0), without, dtypes)
     with pytest.raises(OtherColumnsError, match="Tracks: written with other columns than this version declares"):
         decode(data)

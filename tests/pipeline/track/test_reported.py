@@ -147,3 +147,15 @@ def test_zone_and_runway_are_those_of_the_place() -> None:
     tracks = reported_tracks(core)
     assert tracks.zone.tolist() == [3, 3, -1]
     assert tracks.runway.tolist() == [-1, 0, 0]
+
+
+def test_what_flies_over_a_runway_is_not_on_it() -> None:
+    core = core_of(
+        {"altitude": 3000.0, "on_ground": False}, {"altitude": 30.0, "on_ground": False},
+        {"altitude": 3000.0, "on_ground": True}, {"on_ground": False},
+    )  # fmt: skip
+    for name in ("rows", "filter"):
+        getattr(core.store, name)["state"][:4, 1] = 20.0
+    tracks = reported_tracks(core)
+    assert tracks.runway.tolist() == [-1, 0, 0, 0]
+    assert tracks.zone.tolist() == [-1, 3, 3, 3]

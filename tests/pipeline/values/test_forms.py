@@ -46,6 +46,14 @@ def test_other_values_are_the_same_form() -> None:
     assert other_form({**grown(), "heard": None}, own()) is None
 
 
+def test_shorter_texts_fit_but_longer_ones_do_not() -> None:
+    saved = grown()
+    saved["tracker"]["store"]["name"] = np.full(7, "a", "U5")
+    assert other_form(saved, own()) is None
+    saved["tracker"]["store"]["name"] = np.full(7, "a", "U7")
+    assert other_form(saved, own()) == "tracker.store.name has rows of <U7 [], here <U6 []"
+
+
 @pytest.mark.parametrize(
     ("change", "told"),
     [
