@@ -55,9 +55,10 @@ warmup: install ## compile all kernels now, so that the next start is quick
 
 lock: $(UV_WANTED) ## work out both lock files anew from pyproject.toml
 	$(UV) pip compile -q --universal --generate-hashes --no-emit-index-url --no-header --python-version 3.11 \
-	  pyproject.toml --extra build -o requirements.lock
-	$(UV) pip compile -q --universal --generate-hashes --no-emit-index-url --no-header --python-version 3.11 \
 	  pyproject.toml --extra build --extra dev -o requirements-dev.lock
+	@# the versions that are tested are the versions that run
+	$(UV) pip compile -q --universal --generate-hashes --no-emit-index-url --no-header --python-version 3.11 \
+	  --constraint requirements-dev.lock pyproject.toml --extra build -o requirements.lock
 
 clean: ## remove everything that was made here (not data/)
 	rm -rf $(VENV) .uv node_modules build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +24,28 @@ class Refused(ValueError):
     """The command or the data cannot be taken; the message says why."""
 
 
-class RefusedTime(Refused):
-    """Everything in a message is refused for its time. counts: rows by reason ("ahead", "behind", "invalid")."""
+class RefusedRow(NamedTuple):
+    """A row that was not taken. row: its place in what was given, from 0. reason: one word. message: for the sender."""
 
-    def __init__(self, message: str, counts: Mapping[str, int]) -> None:
+    row: int
+    reason: str
+    message: str
+
+
+class RefusedTime(Refused):
+    """Everything in a message is refused for its time. rows: each with its reason ("ahead", "behind", "invalid")."""
+
+    def __init__(self, message: str, rows: Sequence[RefusedRow]) -> None:
         super().__init__(message)
-        self.counts = dict(counts)
+        self.rows = tuple(rows)
+
+
+@dataclass(frozen=True, slots=True)
+class Submitted:
+    """What became of rows that were given: how many are taken, and those refused for their time."""
+
+    taken: int
+    refused: tuple[RefusedRow, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,11 +171,14 @@ class Service(Protocol):
     def submit_sweeps(self, radar: str, body: bytes) -> dict[str, int]:
         """Take sweeps in the documented octet form; counts taken and dropped. Raises UnknownId, Refused."""
 
-    def submit_node_events(self, events: NodeEvents) -> dict[str, int]:
-        """Take node events (their `node` is the index in `nodes`); counts taken and, by reason, refused for their time.
+    def submit_node_events(self, events: NodeEvents) -> Submitted:
+        """Take node events (their `node` is the index in `nodes`), but for those whose time is wrong.
 
         Raises RefusedTime when all are refused, Refused when the queue is full.
         """
 
-    def submit_target_reports(self, reports: TargetReports) -> dict[str, int]:
-        """Take target reports; counts and raises like `submit_node_events`."""
+    def submit_target_reports(self, reports: TargetReports) -> Submitted:
+        """Take target reports; answers and raises like `submit_node_events`."""
+
+    def note_bad_rows(self, feed: Literal["nodes", "reports"], counts: Mapping[str, int]) -> None:
+        """Count rows that could not be read, by reason, among what the feed's sensor state tells."""

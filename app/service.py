@@ -8,10 +8,19 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, Literal
 
 from app.assembly import FRONT_END, build_parts, chain_of, check_parts, node_site, radar_site, surface_engine
-from app.contract import FrontEnd, PictureListener, Readiness, Refused, RefusedTime, ReplayControl, UnknownId, Video
+from app.contract import (
+    FrontEnd,
+    PictureListener,
+    Readiness,
+    Refused,
+    ReplayControl,
+    Submitted,
+    UnknownId,
+    Video,
+)
 from app.ingest.octets import OctetIntake
 from app.ingest.udp import VideoReceiver
 from app.journal.recorder import JournalRecorder
@@ -19,6 +28,7 @@ from app.journal.video import VideoRecorder
 from app.journal.writer import JournalWriter
 from app.runtime.clocks import FeedTimes, RadarTimes
 from app.runtime.compile_apart import CompilerApart
+from app.runtime.feeds import Feed
 from app.runtime.front_end import FrontEndSwitch
 from app.runtime.host_clock import HostClock
 from app.runtime.radar_worker import RadarWorker
@@ -35,11 +45,6 @@ from pipeline.tables import NodeEvents, Sweeps, TargetReports
 from pipeline.track.expected_headings import expected_headings
 
 log = logging.getLogger(__name__)
-
-Rows = TypeVar("Rows", NodeEvents, TargetReports)
-
-SENSOR_SILENT_S = 10.0
-"""Target reports and node events are called silent after this long without any."""
 
 
 class SurfaceService:
@@ -76,8 +81,6 @@ class SurfaceService:
         self._receivers: dict[str, VideoReceiver] = {}
         self._surface: SurfaceWorker | None = None
         self._journal: JournalRecorder | None = None
-        self._heard: dict[str, tuple[float, float, int]] = {}
-        self._heard_lock = threading.Lock()
         self._octets = {
             site.id: OctetIntake(site, index, radar.blocks_per_scan)
             for index, (site, radar) in enumerate(zip(self.radars, settings.radars, strict=True))
@@ -87,10 +90,9 @@ class SurfaceService:
             site.id: RadarTimes(site, radar.clock, self.clock)
             for site, radar in zip(self.radars, settings.radars, strict=True)
         }
-        self._feed_times = {
-            "nodes": FeedTimes("event", settings.clocks.nodes, [one.id for one in self.nodes]),
-            "reports": FeedTimes("report", settings.clocks.reports),
-        }
+        event_times = FeedTimes("event", settings.clocks.nodes, [one.id for one in self.nodes])
+        self._nodes = Feed("nodes", "node", event_times, all(node.simulated for node in self.nodes))
+        self._reports = Feed("reports", "report", FeedTimes("report", settings.clocks.reports))
 
     def prepare(self, first_alert: int = 1, resume: bool = True) -> None:
         """Build the chains and the engine and compile every kernel. Raises SettingsError.
@@ -182,11 +184,9 @@ class SurfaceService:
     def sensors(self) -> tuple[SensorState, ...]:
         """The health of every radar, the pavement nodes, the target reports, the tracker and what else was added."""
         radars = tuple(self._radar_state(site) for site in self.radars)
-        others = []
-        if self.nodes:
-            others.append(self._feed_state("nodes", "node", all(node.simulated for node in self.nodes)))
-        if "reports" in self._heard or self._feed_times["reports"].has_refused:
-            others.append(self._feed_state("reports", "report", False))
+        others = [self._nodes.state()] if self.nodes else []
+        if self._reports.ever_tried:
+            others.append(self._reports.state())
         return (*radars, *others, self._surface_state(), *(one() for one in self.extra_sensors))
 
     def video(self, radar: str) -> Video:
@@ -252,13 +252,20 @@ class SurfaceService:
                 take(replace(block, arrival=arrival))
         return counted
 
-    def submit_node_events(self, events: NodeEvents) -> dict[str, int]:
+    def submit_node_events(self, events: NodeEvents) -> Submitted:
         """Take node events, and have them stored."""
-        return self._submit("nodes", events, self.keep_node_events)
+        good, submitted = self._nodes.submit(events, self.clock.now(), self._running.offer)
+        if len(good):
+            self.keep_node_events(good)
+        return submitted
 
-    def submit_target_reports(self, reports: TargetReports) -> dict[str, int]:
+    def submit_target_reports(self, reports: TargetReports) -> Submitted:
         """Take target reports."""
-        return self._submit("reports", reports)
+        return self._reports.submit(reports, self.clock.now(), self._running.offer)[1]
+
+    def note_bad_rows(self, feed: Literal["nodes", "reports"], counts: Mapping[str, int]) -> None:
+        """Count rows that could not be read, by reason."""
+        (self._nodes if feed == "nodes" else self._reports).note_bad(counts)
 
     @property
     def _running(self) -> SurfaceWorker:
@@ -279,21 +286,6 @@ class SurfaceService:
         times = self._radar_times[worker.site.id]
         return lambda block: worker.put(times.correct(block))
 
-    def _submit(self, kind: str, table: Rows, keep: Callable[[Rows], None] = lambda _: None) -> dict[str, int]:
-        """Judge the times, queue what is good, and count."""
-        surface = self._running
-        good, refused, why = self._feed_times[kind].judge(table, self.clock.now())
-        if refused and not len(good):
-            raise RefusedTime(why if len(table) == 1 else f"all {len(table)} are refused; {why}", refused)
-        if len(good):
-            if not surface.offer(good):
-                raise Refused(f"the queue for {kind} is full")
-            with self._heard_lock:  # requests come in several threads
-                _, _, total = self._heard.get(kind, (0.0, 0.0, 0))
-                self._heard[kind] = (time.monotonic(), float(good.time.max()), total + len(good))
-            keep(good)
-        return {"taken": len(good), **{f"refused_{reason}": count for reason, count in refused.items()}}
-
     def _impaired(self, _sensors: tuple[SensorState, ...]) -> tuple[str, ...]:
         """Sensors without which the picture is not whole, so that alerts are held at information.
 
@@ -303,12 +295,9 @@ class SurfaceService:
         silent = tuple(
             id for id, worker in self._workers.items() if worker.status != "ok" or self._radar_times[id].late
         )
-        if not self.radars and "reports" in self._heard and self._is_silent("reports"):
+        if not self.radars and self._reports.silent:
             return (*silent, "reports")
         return silent
-
-    def _is_silent(self, feed: str) -> bool:
-        return time.monotonic() - self._heard[feed][0] > SENSOR_SILENT_S
 
     def _first_picture(self, picture: Picture, _changes: tuple[AlertChange, ...]) -> None:
         self.checks["picture"] = True
@@ -341,14 +330,6 @@ class SurfaceService:
         detail = "; ".join(words for words in (clock, worker.cuts.words(), switch.learning) if words)
         status = "degraded" if clock and worker.status == "ok" else worker.status
         state = SensorState(site.id, "radar", status, worker.last_time, site.simulated, detail, counters, switch.names)
-        return times.shown(state)
-
-    def _feed_state(self, id: str, kind: str, simulated: bool) -> SensorState:
-        heard, times = self._heard.get(id), self._feed_times[id]
-        if heard is None:
-            return times.shown(SensorState(id, kind, "waiting", None, simulated))
-        silent = kind != "node" and self._is_silent(id)
-        state = SensorState(id, kind, "silent" if silent else "ok", heard[1], simulated, counters={"taken": heard[2]})
         return times.shown(state)
 
     def _surface_state(self) -> SensorState:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 import tomllib
 from pathlib import Path
 from typing import Any, Literal
@@ -18,6 +19,13 @@ ROOT = Path(__file__).resolve().parent.parent
 
 NOT_SETTINGS = frozenset({"AIRSIDE_SETTINGS", "AIRSIDE_REQUIRE_SERVICES"})
 """Environment variables of this prefix that are not settings."""
+
+
+PLAIN_PATH = re.compile(r"(/[A-Za-z0-9._~-]+)+")
+"""A path that is safe to put in front of a link: never "//host"."""
+
+OWN_PATHS = frozenset({"api", "data", "chunks", "health", "metrics", "3d", "docs", "css", "js"})
+"""First parts of the paths of the service: below one of these, a path with and without `root_path` look alike."""
 
 
 class SettingsError(ValueError):
@@ -250,6 +258,11 @@ class Settings(BaseSettings):
     mode: Literal["live", "demo", "replay"] = "live"
     host: str = "127.0.0.1"
     port: int = Field(8000, ge=0, le=65535)
+    root_path: str = Field(
+        "",
+        description='path under which a proxy serves all of it, such as "/airside"; without it the X-Forwarded-Prefix '
+        "of the proxy holds",
+    )
     airport: str = Field("LFPO", description="ICAO code of a shipped airport, or the path of an imported GeoJSON file")
     data_dir: Path = Path("data")
     database_url: str = Field("", description="empty: SQLite in data_dir; postgresql+psycopg://... for a fleet")
@@ -271,6 +284,16 @@ class Settings(BaseSettings):
     mqtt: MqttSettings = MqttSettings()
     clocks: ClocksSettings = ClocksSettings()
     demo: DemoSettings = DemoSettings()
+
+    @field_validator("root_path")
+    @classmethod
+    def _plain_path(cls, value: str) -> str:
+        path = value.rstrip("/")
+        if path and not PLAIN_PATH.fullmatch(path):
+            raise ValueError('a path such as "/airside"')
+        if path and path.split("/")[1] in OWN_PATHS:
+            raise ValueError(f"{path} begins like a path of the service itself")
+        return path
 
     @property
     def database(self) -> str:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from fastapi import APIRouter, FastAPI, WebSocket
+from starlette.requests import Request
 from starlette.responses import Response
 
 from app.api import models, problems
@@ -16,6 +17,7 @@ from app.api.context import Context, answer
 from app.api.intake import intake_router
 from app.api.metrics import metrics_router
 from app.api.middleware import Guard
+from app.api.openapi import document, operation_id, served_at
 from app.api.pages import pages_router
 from app.api.parts import parts_router
 from app.api.readsb import readsb_router
@@ -58,13 +60,20 @@ def create_app(service: Service, *, hub: Hub, store: Store | None, view3d_router
         summary="Live picture and runway alerts of the airport surface",
         description=DESCRIPTION,
         version=version("airside"),
+        openapi_url=None,
         docs_url=None,
         redoc_url=None,
         lifespan=lifespan,
         redirect_slashes=False,
+        generate_unique_id_function=operation_id,
     )
     problems.install(app)
-    app.add_middleware(Guard, max_body=settings.limits.body_bytes, allowed_origins=settings.allowed_origins)
+    app.add_middleware(
+        Guard,
+        max_body=settings.limits.body_bytes,
+        allowed_origins=settings.allowed_origins,
+        root_path=settings.root_path,
+    )
     app.include_router(_operation_router(service))
     app.include_router(surveillance_router(context))
     app.include_router(video_router(context))
@@ -73,7 +82,7 @@ def create_app(service: Service, *, hub: Hub, store: Store | None, view3d_router
     app.include_router(intake_router(context))
     app.include_router(readsb_router(context))
     app.include_router(metrics_router(context))
-    app.include_router(_feed_router(context))
+    app.include_router(_document_router(app, context))
     if view3d_router is not None:
         app.include_router(view3d_router)
     app.include_router(pages_router())
@@ -98,20 +107,22 @@ def _operation_router(service: Service) -> APIRouter:
     return router
 
 
-def _feed_router(context: Context) -> APIRouter:
+def _document_router(app: FastAPI, context: Context) -> APIRouter:
     router = APIRouter()
-    made: list[dict[str, Any]] = []
+    icao = context.wire.airport.icao
 
     @router.websocket("/api/v1/live")
     async def live(websocket: WebSocket) -> None:
         """The live feed; /asyncapi.json describes it."""
         await serve(websocket, context.hub)
 
+    @router.get("/openapi.json", include_in_schema=False)
+    async def openapi(request: Request) -> Response:
+        return answer(served_at(document(app), request.scope["root_path"]))
+
     @router.get("/asyncapi.json", tags=["operation"])
-    async def asyncapi() -> Response:
+    async def asyncapi(request: Request) -> Response:
         """The AsyncAPI 3.0 document of the live feed and the bus."""
-        if not made:
-            made.append(asyncapi_document(context.wire.airport.icao, version("airside")))
-        return answer(made[0])
+        return answer(asyncapi_document(icao, version("airside"), request.scope["root_path"]))
 
     return router

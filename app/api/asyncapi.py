@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 from pydantic import BaseModel
@@ -23,12 +24,9 @@ again later), 1001 (the service ends).
 """
 
 
-def document(icao: str, version: str) -> dict[str, Any]:
-    """The document for one airport."""
+def document(icao: str, version: str, prefix: str = "") -> dict[str, Any]:
+    """The document for one airport. prefix: "", or the path under which a proxy serves it, such as "/airside"."""
     kinds: list[type[BaseModel]] = [*FROM_CLIENT, *TO_CLIENT, models.Picture]
-    _, schemas = models_json_schema(
-        [(kind, "serialization") for kind in kinds], by_alias=True, ref_template="#/components/schemas/{model}"
-    )
     return {
         "asyncapi": "3.0.0",
         "info": {"title": f"Airside live feed {icao}", "version": version, "description": DESCRIPTION.strip()},
@@ -37,6 +35,7 @@ def document(icao: str, version: str) -> dict[str, Any]:
             "here": {
                 "host": "{host}",
                 "protocol": "ws",
+                "pathname": prefix or "/",
                 "variables": {"host": {"default": "127.0.0.1:8000", "description": "where the service listens"}},
             }
         },
@@ -74,9 +73,18 @@ def document(icao: str, version: str) -> dict[str, Any]:
                 }
                 for kind in kinds
             },
-            "schemas": schemas["$defs"],
+            "schemas": _schemas(),
         },
     }
+
+
+@cache
+def _schemas() -> Any:
+    kinds: list[type[BaseModel]] = [*FROM_CLIENT, *TO_CLIENT, models.Picture]
+    _, schemas = models_json_schema(
+        [(kind, "serialization") for kind in kinds], by_alias=True, ref_template="#/components/schemas/{model}"
+    )
+    return schemas["$defs"]
 
 
 def _message(kind: type[BaseModel]) -> dict[str, str]:

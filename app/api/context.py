@@ -8,11 +8,12 @@ from datetime import UTC, datetime
 from http import HTTPStatus
 from typing import TYPE_CHECKING, Annotated, Any
 
-from fastapi import Query
+from fastapi import Depends, Query
 from pydantic import BeforeValidator, WithJsonSchema
 from starlette.responses import Response
 
 from app.api.models import Problem
+from app.api.openapi import reference
 from app.api.problems import PROBLEM, ApiProblem
 from app.contract import Refused, Service
 from app.live.hub import Hub
@@ -62,11 +63,8 @@ def answer(value: Any, status: int = 200) -> Response:
 
 def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """The declarations of these errors for OpenAPI."""
-    schema = Problem.model_json_schema()
-    return {
-        status: {"description": HTTPStatus(status).phrase, "content": {PROBLEM: {"schema": schema}}}
-        for status in statuses
-    }
+    content = {PROBLEM: {"schema": reference(Problem.__name__)}}
+    return {status: {"description": HTTPStatus(status).phrase, "content": content} for status in statuses}
 
 
 def instant(value: Any) -> float:
@@ -91,4 +89,14 @@ _TIME_SCHEMA = {
 }
 Instant = Annotated[float, BeforeValidator(instant), WithJsonSchema(_TIME_SCHEMA)]
 From = Annotated[Instant | None, Query(alias="from", description="not before: Unix seconds or ISO 8601")]
-To = Annotated[Instant | None, Query(description="not after: Unix seconds or ISO 8601")]
+To = Annotated[Instant | None, Query(alias="to", description="not after: Unix seconds or ISO 8601")]
+
+
+def _span(first: From = None, last: To = None) -> tuple[float | None, float | None]:
+    if first is not None and last is not None and first > last:
+        raise ApiProblem(422, f"from ({first:.3f}) is later than to ({last:.3f})")
+    return first, last
+
+
+Span = Annotated[tuple[float | None, float | None], Depends(_span)]
+"""The times from and to of a question; 422 when they are the wrong way round."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Annotated, Any
+from collections import Counter
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Annotated, Any, Literal, TypeVar
 
-import msgspec
 from fastapi import APIRouter, Path
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
@@ -13,14 +14,20 @@ from starlette.responses import Response
 
 from app.api import models
 from app.api.context import Context, answer, problems
+from app.api.openapi import json_rows
 from app.api.problems import ApiProblem
-from app.contract import RefusedTime
+from app.contract import RefusedRow, RefusedTime, Submitted
 from app.ingest import octets
 from app.ingest.node_events import NodeEventRow, parse_node_events
 from app.ingest.target_reports import TargetReportRow, parse_target_reports
+from app.ingest.wire_json import BadMessage, Parsed
+from app.wire import Row
+from pipeline.tables import NodeEvents, TargetReports
 
 OCTETS = "application/octet-stream"
 JSON = "application/json"
+
+Rows = TypeVar("Rows", NodeEvents, TargetReports)
 
 
 def intake_router(context: Context) -> APIRouter:
@@ -34,7 +41,9 @@ def intake_router(context: Context) -> APIRouter:
         response_model=models.Counted,
         responses=failures,
         description=octets.__doc__,
-        openapi_extra={"requestBody": {"required": True, "content": {OCTETS: {"schema": {"type": "string"}}}}},
+        openapi_extra={
+            "requestBody": {"required": True, "content": {OCTETS: {"schema": {"type": "string", "format": "binary"}}}}
+        },
     )
     async def sweeps(id: Annotated[str, Path(max_length=32)], request: Request) -> Response:
         body = await _body(request, OCTETS)
@@ -43,35 +52,41 @@ def intake_router(context: Context) -> APIRouter:
 
     @router.post(
         "/nodes/events",
-        response_model=models.Counted,
+        response_model=models.RowsTaken,
         responses=failures,
-        openapi_extra=_json_body(NodeEventRow, limits.node_events_per_request),
+        openapi_extra=json_rows(NodeEventRow, limits.node_events_per_request),
     )
     async def node_events(request: Request) -> Response:
-        """Events of the nodes in the pavement, one object or an array; nothing is taken when one is wrong.
+        """Events of the nodes in the pavement, one object or an array.
 
-        Events whose time is too far from that of their arrival are refused and counted by reason, the others taken.
+        The good ones are taken, and each that is not is told in `errors` by its index and the reason: what is wrong
+        with it, or that its time is too far from that of its arrival. Unknown members are ignored and named in
+        `ignored`. 422 when nothing can be taken.
         """
         body = await _body(request, JSON)
-        events = _parsed(lambda: parse_node_events(body, service.nodes, limits.node_events_per_request))
-        return answer(await run_in_threadpool(_submitted, context, lambda: service.submit_node_events(events)))
+        read = partial(parse_node_events, body, service.nodes, limits.node_events_per_request)
+        return answer(await run_in_threadpool(_take, context, "nodes", read, service.submit_node_events))
 
     @router.post(
         "/targets/reports",
-        response_model=models.Counted,
+        response_model=models.RowsTaken,
         responses=failures,
-        openapi_extra=_json_body(TargetReportRow, limits.node_events_per_request),
+        openapi_extra=json_rows(TargetReportRow, limits.node_events_per_request),
     )
     async def target_reports(request: Request) -> Response:
-        """Positions that cooperative sensors give (ADS-B, multilateration, vehicle beacons).
+        """Positions that cooperative sensors give (ADS-B, multilateration, vehicle beacons), one object or an array.
 
+        `address`: six hexadecimal digits, with `~` before one that is not of ICAO; `000000` and `ffffff` are none.
+        `on_ground`: left out when unknown; then the altitude decides, and without one it is held to be on the ground.
         `source` names the sensor or feed that a report came through: at most 16 ASCII letters, digits, `_`, `-`, `.`.
-        Reports whose time is too far from that of their arrival are refused and counted by reason, the others taken.
+
+        The good ones are taken, and each that is not is told in `errors` by its index and the reason: what is wrong
+        with it, or that its time is too far from that of its arrival. Unknown members are ignored and named in
+        `ignored`. 422 when nothing can be taken.
         """
         body = await _body(request, JSON)
-        frame, limit = service.airport.frame, limits.node_events_per_request
-        reports = _parsed(lambda: parse_target_reports(body, frame, limit))
-        return answer(await run_in_threadpool(_submitted, context, lambda: service.submit_target_reports(reports)))
+        read = partial(parse_target_reports, body, service.airport.frame, limits.node_events_per_request)
+        return answer(await run_in_threadpool(_take, context, "reports", read, service.submit_target_reports))
 
     return router
 
@@ -88,27 +103,43 @@ async def _body(request: Request, media_type: str) -> bytes:
     return await request.body()
 
 
-def _submitted(context: Context, work: Callable[[], dict[str, int]]) -> dict[str, int]:
-    """What was taken and refused. Raises ApiProblem: 422 when all is refused for its time, 503 for want of room."""
+def _take(
+    context: Context,
+    feed: Literal["nodes", "reports"],
+    read: Callable[[], Parsed[Rows]],
+    submit: Callable[[Rows], Submitted],
+) -> Row:
+    """Read and submit the rows of a message; what was taken, and each row that was not.
+
+    Raises ApiProblem: 422 when nothing is taken, with the reason of each row; 503 for want of room.
+    """
     try:
-        counted: dict[str, int] = context.ask(work, 503)
+        parsed = read()
+    except BadMessage as error:
+        context.service.note_bad_rows(feed, Counter(one.reason for one in error.rows))
+        raise ApiProblem(422, str(error), errors=_errors(error.rows)) from error
+    context.service.note_bad_rows(feed, Counter(one.reason for one in parsed.bad))
+    try:
+        submitted: Submitted = context.ask(lambda: submit(parsed.rows), 503)
     except ApiProblem as error:
         if isinstance(error.__cause__, RefusedTime):
-            raise ApiProblem(422, str(error.__cause__)) from error
+            rows = _placed(error.__cause__.rows, parsed)
+            raise ApiProblem(422, str(error.__cause__), errors=_errors(rows)) from error
         raise
-    return counted
+    rows = _placed(submitted.refused, parsed)
+    counts = Counter(f"refused_{one.reason}" for one in rows)
+    made: Row = {"taken": submitted.taken, **counts}
+    if rows:
+        made["errors"] = _errors(rows)
+    if parsed.ignored:
+        made["ignored"] = parsed.ignored
+    return made
 
 
-def _parsed(work: Callable[[], Any]) -> Any:
-    try:
-        return work()
-    except ValueError as error:
-        raise ApiProblem(422, str(error)) from error
+def _placed(refused: Sequence[RefusedRow], parsed: Parsed[Any]) -> list[RefusedRow]:
+    """All rows that were not taken, by their place in the message."""
+    return sorted([*parsed.bad, *(one._replace(row=parsed.places[one.row]) for one in refused)])
 
 
-def _json_body(row: type[msgspec.Struct], limit: int) -> dict[str, Any]:
-    """The request body for OpenAPI, from the struct that decodes it."""
-    schemas, components = msgspec.json.schema_components([row], ref_template="#/components/schemas/{name}")
-    one = components[row.__name__] if row.__name__ in components else schemas[0]
-    many = {"type": "array", "items": one, "maxItems": limit}
-    return {"requestBody": {"required": True, "content": {JSON: {"schema": {"anyOf": [one, many]}}}}}
+def _errors(rows: Sequence[RefusedRow]) -> list[Row]:
+    return [{"index": one.row, "reason": one.reason, "message": one.message} for one in rows]

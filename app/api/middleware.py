@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.problems import ApiProblem, problem
+from app.api.subpath import below, path_below, root_of
 from app.live.session import origin_allowed
 
 STRICT = (
@@ -24,30 +26,49 @@ HEADERS = {
     "X-Frame-Options": "SAMEORIGIN",
     "Cross-Origin-Opener-Policy": "same-origin",
 }
+UNCACHED = ("/api/", "/data/", "/chunks/", "/health/", "/metrics")
+OPEN = "/data/"
+"""What pages of any origin may read: it is made for them, and nothing can be written there."""
+
+OPEN_METHODS = "GET, HEAD, OPTIONS"
+PREFLIGHT = {
+    "Access-Control-Allow-Methods": OPEN_METHODS,
+    "Access-Control-Allow-Headers": "*",
+    "Access-Control-Max-Age": "86400",
+}
 WRITING = frozenset({"POST", "PUT", "PATCH", "DELETE"})
 
 
 class Guard:
-    """ASGI middleware. max_body: bytes that a request may carry; allowed_origins: further pages that may write."""
+    """ASGI middleware. max_body: bytes that a request may carry; allowed_origins: further pages that may write.
 
-    def __init__(self, app: ASGIApp, max_body: int, allowed_origins: tuple[str, ...]) -> None:
+    root_path: below which a proxy serves all of it (`app.api.subpath`). HEAD is answered wherever GET is.
+    """
+
+    def __init__(self, app: ASGIApp, max_body: int, allowed_origins: tuple[str, ...], root_path: str = "") -> None:
         self.app = app
         self.max_body = max_body
         self.allowed_origins = allowed_origins
+        self.root_path = root_path
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request on, guarded."""
+        if scope["type"] not in ("http", "websocket"):
+            await self.app(scope, receive, send)
+            return
+        headers = Headers(scope=scope)
+        scope = below(scope, root_of(headers, self.root_path))
         if scope["type"] == "websocket":
             # The live feed must be able to cut a peer that never reads; ASGI itself has no word for that.
             scope["airside.protocol"] = getattr(send, "__self__", None)
             await self.app(scope, receive, send)
             return
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        headers = Headers(scope=scope)
-        answer = _with_headers(scope["path"], send)
-        refusal = self._refusal(scope, headers)
+        path = path_below(scope)
+        answer = _with_headers(path, send)
+        if scope["method"] == "HEAD":
+            scope["method"] = "GET"
+            answer = _without_body(answer)
+        refusal = self._refusal(scope, headers) or _short_answer(scope, path)
         if refusal is not None:
             await refusal(scope, receive, answer)
             return
@@ -78,6 +99,15 @@ class Guard:
         return counted
 
 
+def _short_answer(scope: Scope, path: str) -> Response | None:
+    """What is answered here: the root without its slash, and the question of a foreign page whether it may read."""
+    if not path:
+        return RedirectResponse(f"{scope['root_path']}/", 308)
+    if scope["method"] == "OPTIONS" and path.startswith(OPEN):
+        return Response(status_code=204, headers={"Allow": OPEN_METHODS, **PREFLIGHT})
+    return None
+
+
 def _with_headers(path: str, send: Send) -> Send:
     policy = VIEW_3D if path == "/3d" or path.startswith("/3d/") else STRICT
 
@@ -87,8 +117,25 @@ def _with_headers(path: str, send: Send) -> Send:
             for name, value in HEADERS.items():
                 headers.setdefault(name, value)
             headers.setdefault("Content-Security-Policy", policy)
-            if path.startswith(("/api/", "/data/", "/health/", "/metrics")):
+            if path.startswith(UNCACHED):
                 headers.setdefault("Cache-Control", "no-store")
+            if path.startswith(OPEN):
+                headers["Access-Control-Allow-Origin"] = "*"
+            allowed = headers.get("allow", "").split(", ")
+            if "GET" in allowed and "HEAD" not in allowed:
+                headers["Allow"] = ", ".join([*allowed, "HEAD"])
         await send(message)
 
     return answer
+
+
+def _without_body(send: Send) -> Send:
+    """Send the head of an answer alone, as if it were to a GET."""
+
+    async def head(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            await send(message)
+        elif message["type"] == "http.response.body" and not message.get("more_body", False):
+            await send({"type": "http.response.body", "body": b""})
+
+    return head

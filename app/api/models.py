@@ -13,6 +13,8 @@ from pydantic import BaseModel, ConfigDict, Field
 LARGEST_ID = 2**53 - 1
 """The greatest whole number that every reader of JSON takes exactly; ids hold 64 bits and never get there."""
 
+COMPLETE = "false while the database does not answer: what it alone has is missing"
+
 Seconds = Annotated[float, Field(description="Unix seconds, UTC", examples=[1760000000.25])]
 Mode = Annotated[Literal["live", "demo", "replay"], Field(description="anything but live is no live traffic")]
 TrackId = Annotated[
@@ -39,6 +41,15 @@ class Model(BaseModel):
     model_config = ConfigDict(extra="forbid", populate_by_name=True)
 
 
+class Fault(Model):
+    """One single fault of a request: a field that is wrong, with its place, or a row of a message, with its index."""
+
+    message: str
+    place: str | None = Field(None, description="the field", examples=["body.by"])
+    index: int | None = Field(None, ge=0, description="which object of the array, from 0")
+    reason: str | None = Field(None, description="in one word", examples=["bad_value"])
+
+
 class Problem(BaseModel):
     """RFC 9457 problem details."""
 
@@ -47,6 +58,7 @@ class Problem(BaseModel):
     title: str
     status: int
     detail: str
+    errors: list[Fault] | None = Field(None, description="the single faults, where there are some")
 
 
 class Position(Model):
@@ -77,7 +89,7 @@ class Track(Model):
     width_m: float | None
     class_: ClassName = Field(alias="class")
     callsign: str | None
-    address: str | None = Field(description="24-bit address, six lower-case hex digits")
+    address: str | None = Field(description="24-bit address, six lower-case hex digits, ~ before one not of ICAO")
     phase: PhaseName = Field(description="coasting: not seen at the last looks, position predicted")
     zone: str | None = Field(description="name (or id) of the map feature it is on")
     runway: str | None = Field(description="runway whose strip it is in")
@@ -264,6 +276,7 @@ class AlertList(Model):
 
     mode: Mode
     alerts: list[Alert]
+    complete: bool = Field(description=COMPLETE)
 
 
 class AlertAnswer(Model):
@@ -277,6 +290,7 @@ class AlertLife(AlertAnswer):
     """One alert with every stored step of its life."""
 
     changes: list[AlertStep]
+    complete: bool = Field(description=COMPLETE)
 
 
 class Acknowledgement(Model):
@@ -320,6 +334,25 @@ class Counted(Model):
 
     model_config = ConfigDict(extra="allow")
     taken: int
+
+
+class RefusedRow(Model):
+    """A row of a message that was not taken."""
+
+    index: int = Field(ge=0, description="which object of the array, from 0")
+    reason: str = Field(
+        description="`bad_value`, `unknown_node`; for its time `ahead`, `behind`, `invalid`", examples=["bad_value"]
+    )
+    message: str
+
+
+class RowsTaken(Counted):
+    """What became of the rows of a message: how many are taken, how many refused by reason, and each refused one."""
+
+    errors: list[RefusedRow] | None = Field(None, description="the rows that were not taken; left out when all were")
+    ignored: list[str] | None = Field(
+        None, description="names of members that nobody knows, which were ignored; left out when there were none"
+    )
 
 
 class Health(Model):

@@ -17,7 +17,7 @@ STATIC = ROOT / "static"
 class _PageConvertor(Convertor[str]):
     """Paths that are pages: none of the service's own."""
 
-    regex = r"(?!api/|data/|health/|metrics$|3d/|3d$).*"
+    regex = r"(?!api/|data/|chunks/|health/|metrics$|3d/|3d$).*"
 
     def convert(self, value: str) -> str:
         return value
@@ -36,7 +36,7 @@ def pages_router() -> APIRouter:
 
     @router.get("/docs", include_in_schema=False)
     async def docs() -> Response:
-        return RedirectResponse("/docs/")
+        return RedirectResponse("docs/")
 
     @router.api_route("/{path:page}", methods=["GET", "HEAD"], include_in_schema=False)
     async def page(path: str, request: Request) -> Response:

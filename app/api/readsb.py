@@ -6,13 +6,21 @@ the airport, so an altitude is given only when the map says how high the airport
 
 from __future__ import annotations
 
+import gzip
+import math
+import re
+import time
 from importlib.metadata import version
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Path
+from starlette.requests import Request
 from starlette.responses import Response
 
-from app.api.context import Context, answer
+from app.api import readsb_models as models
+from app.api.context import Context, answer, problems
+from app.api.problems import ApiProblem
+from app.api.trails import INTERVAL_S, Trails
 from app.wire import Row
 from pipeline.picture import Picture
 
@@ -26,34 +34,68 @@ NO_ADDRESS = 1 << 24
 """A hex has 24 bits. Two live tracks would share one only if 16 million others had begun between them."""
 
 
-def readsb_router(context: Context) -> APIRouter:
-    """GET /data/aircraft.json and /data/receiver.json."""
-    router = APIRouter(prefix="/data", tags=["readsb"])
-    elevation = airport_elevation(context.service.airport_geojson)
+OLD_S = INTERVAL_S + 2.0
+"""Targets not measured for longer are left out of the trails, as in tar1090's own script."""
 
-    @router.get("/aircraft.json")
+NUMBER = re.compile(r"\s*(-?\d+(?:\.\d+)?)\s*(m|ft)?\s*")
+"""A height as OpenStreetMap has it: metres unless it says feet."""
+
+
+def readsb_router(context: Context) -> APIRouter:
+    """GET /data/aircraft.json, /data/receiver.json, /data/history_N.json and /chunks/."""
+    router = APIRouter(tags=["readsb"])
+    elevation = airport_elevation(context.service.airport_geojson)
+    trails = Trails(lambda picture: trail_document(picture, context.hub.rows(), elevation))
+    context.hub.on_picture.append(trails.show)
+
+    @router.get("/data/aircraft.json", response_model=models.Aircraft)
     async def aircraft() -> Response:
-        """The live tracks as readsb would give them; a hex with ~ is the track's id."""
+        """The live tracks as readsb would give them; a hex with ~ is not of ICAO, or is made of the track's id."""
         picture = context.hub.picture
         if picture is None:
-            return answer({"now": 0.0, "messages": 0, "aircraft": []})
+            return answer({"now": time.time(), "messages": 0, "aircraft": []})
         return answer(aircraft_document(picture, context.hub.rows(), elevation))
 
-    @router.get("/receiver.json")
+    @router.get("/data/receiver.json", response_model=models.Receiver)
     async def receiver() -> Response:
-        """Where the airport is, and how often to ask."""
+        """Where the airport is, how often to ask, and how many files of history there are."""
         frame = context.service.airport.frame
         return answer(
             {
                 "version": f"airside {version('airside')}",
                 "refresh": 1000,
-                "history": 0,
+                "history": trails.files,
                 "lat": frame.latitude,
                 "lon": frame.longitude,
             }
         )
 
+    @router.get("/data/history_{number}.json", response_model=models.Aircraft, responses=problems(404, 422))
+    async def history_file(request: Request, number: Annotated[int, Path(ge=0, le=10_000)]) -> Response:
+        """The picture of some time in the last hour, 32 s after that with the number before; 0 is the oldest."""
+        return _packed(request, trails.file(number))
+
+    @router.get("/chunks/chunks.json", response_model=models.Chunks)
+    async def chunks() -> Response:
+        """The names of the chunks in which tar1090 reads the last hour."""
+        return answer({"chunks": trails.names(), "chunks_all": trails.names()})
+
+    @router.get("/chunks/{name}", response_model=models.Chunk, responses=problems(404, 422))
+    async def chunk(request: Request, name: Annotated[str, Path(max_length=64)]) -> Response:
+        """Pictures of the last hour, 8 s apart."""
+        return _packed(request, trails.chunk(name))
+
     return router
+
+
+def _packed(request: Request, content: bytes | None) -> Response:
+    """Gzipped JSON, unpacked for a client that does not take it so."""
+    if content is None:
+        raise ApiProblem(404, "there is no such part of the history")
+    headers = {"Vary": "Accept-Encoding"}
+    if "gzip" in request.headers.get("accept-encoding", ""):
+        return Response(content, media_type="application/json", headers={**headers, "Content-Encoding": "gzip"})
+    return Response(gzip.decompress(content), media_type="application/json", headers=headers)
 
 
 def airport_elevation(document: dict[str, Any]) -> float | None:
@@ -62,9 +104,18 @@ def airport_elevation(document: dict[str, Any]) -> float | None:
     candidates += [one.get("properties") for one in document.get("features", ())]
     for properties in candidates:
         for key in ("elevation_m", "ele"):
-            value = properties.get(key) if isinstance(properties, dict) else None
-            if isinstance(value, int | float):
-                return float(value)
+            height = _height(properties.get(key)) if isinstance(properties, dict) else None
+            if height is not None:
+                return height
+    return None
+
+
+def _height(value: Any) -> float | None:
+    found = NUMBER.fullmatch(value) if isinstance(value, str) else None
+    if found:
+        return float(found[1]) / (METRES_TO_FEET if found[2] == "ft" else 1.0)
+    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+        return float(value)
     return None
 
 
@@ -102,9 +153,22 @@ def _aircraft(row: Row, seen: float, hits: int, elevation: float | None) -> Row:
     return {name: value for name, value in made.items() if value is not None}
 
 
+def trail_document(picture: Picture, rows: list[Row], elevation: float | None) -> Row:
+    """What of aircraft.json makes a trail."""
+    made = aircraft_document(picture, rows, elevation)
+    fresh = [one for one in made["aircraft"] if one["seen"] < OLD_S and "lat" in one]
+    return {**made, "aircraft": [{name: one[name] for name in TRAIL if name in one} for one in fresh]}
+
+
+TRAIL = ("hex", "type", "flight", "alt_baro", "gs", "track", "category", "lat", "lon", "messages", "seen", "seen_pos")
+
+
 def _type(row: Row) -> str:
-    if row["address"] is None or "report" not in row["sources"]:
+    """An address says what it came from, also while radar alone carries its track on."""
+    if row["address"] is None:
         return "tisb_trackfile"
+    if row["address"].startswith("~"):
+        return "adsb_other"
     return "adsb_icao_nt" if row["class"] == "vehicle" else "adsb_icao"
 
 

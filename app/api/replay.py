@@ -15,6 +15,7 @@ from starlette.responses import Response
 from app.api import replay_models
 from app.api.context import Context, answer, instant, problems
 from app.api.intake import JSON, json_body
+from app.api.openapi import reference
 from app.api.problems import ApiProblem
 from app.contract import Refused, ReplayControl, ReplayState
 
@@ -37,7 +38,7 @@ def replay_router(context: Context) -> APIRouter:
         """Which recording is shown, where it stands, and how fast it goes. 404 when nothing is replayed."""
         return told(control().state())
 
-    body = {"content": {JSON: {"schema": replay_models.ReplayOrder.model_json_schema()}}, "required": True}
+    body = {"content": {JSON: {"schema": reference("ReplayOrder")}}, "required": True}
 
     @router.put(
         "/replay",

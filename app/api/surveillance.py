@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Path, Query
+from sqlalchemy.exc import SQLAlchemyError
 from starlette.responses import Response
 
 from app.api import models
-from app.api.context import Context, From, To, answer, problems
+from app.api.context import Context, Span, answer, problems
+from app.api.openapi import reference
 from app.api.problems import ApiProblem
 from app.wire import Row, encode
+
+log = logging.getLogger(__name__)
 
 TrackId = Annotated[int, Path(ge=1, le=models.LARGEST_ID, description="id of the track, as in the list of tracks")]
 AlertId = Annotated[int, Path(ge=1, le=2**53)]
@@ -51,7 +57,7 @@ def _picture_routes(router: APIRouter, context: Context) -> None:
     @router.get(
         "/airport.geojson",
         tags=["picture"],
-        responses={200: {"content": {GEOJSON: {"schema": models.GeoJson.model_json_schema()}}}},
+        responses={200: {"content": {GEOJSON: {"schema": reference("GeoJson")}}}},
         response_class=Response,
     )
     def airport() -> Response:
@@ -79,7 +85,7 @@ def _track_routes(router: APIRouter, context: Context) -> None:
         "/tracks.geojson",
         tags=["tracks"],
         response_class=Response,
-        responses={200: {"content": {GEOJSON: {"schema": models.GeoJson.model_json_schema()}}}, **problems(503)},
+        responses={200: {"content": {GEOJSON: {"schema": reference("GeoJson")}}}, **problems(503)},
     )
     async def tracks_geojson() -> Response:
         """The live tracks as GeoJSON points."""
@@ -103,59 +109,68 @@ def _history_routes(router: APIRouter, context: Context) -> None:
     @router.get(
         "/tracks/{id}/history", response_model=models.History, responses=problems(404, 422, 503), tags=["tracks"]
     )
-    def history(id: TrackId, from_: From = None, to: To = None, limit: Limit = 3600) -> Response:
+    def history(id: TrackId, span: Span, limit: Limit = 3600) -> Response:
         """The stored points of the newest track with this id (or the newest within the given times)."""
         if store is None:
             raise ApiProblem(404, "nothing is stored")
-        found = store.track_history(id, from_, to, limit)
+        found = store.track_history(id, *span, limit)
         if found is None:
             raise ApiProblem(404, f"no track with the id {id} is stored")
         return answer({"mode": mode, **found})
 
     @router.get("/history/tracks", response_model=models.StoredTrackList, responses=problems(422, 503), tags=["tracks"])
     def stored_tracks(
-        from_: From = None,
-        to: To = None,
+        span: Span,
         callsign: Annotated[str | None, Query(max_length=8)] = None,
         limit: Limit = 200,
     ) -> Response:
         """Stored tracks, newest first."""
-        rows = store.tracks(from_, to, callsign=callsign, limit=limit) if store is not None else []
+        rows = store.tracks(*span, callsign=callsign, limit=limit) if store is not None else []
         return answer({"mode": mode, "tracks": rows})
 
 
 def _alert_routes(router: APIRouter, context: Context) -> None:
     service, store, mode = context.service, context.store, context.settings.mode
 
-    def live() -> dict[int, Row]:
+    def in_memory() -> dict[int, Row]:
+        """Alerts of this run as they are now; what the database does not have yet is among them."""
         picture = service.picture()
-        return {one.id: context.wire.alert(one) for one in picture.alerts} if picture is not None else {}
+        live = {one.id: one for one in picture.alerts} if picture is not None else {}
+        return {id: context.wire.alert(one) for id, one in {**context.hub.recent.copy(), **live}.items()}
 
-    @router.get("/alerts", response_model=models.AlertList, responses=problems(422, 503), tags=["alerts"])
+    @router.get("/alerts", response_model=models.AlertList, responses=problems(422), tags=["alerts"])
     def alerts(
+        span: Span,
         state: Annotated[Literal["live", "new", "ongoing", "acknowledged", "cleared"] | None, Query()] = None,
-        from_: From = None,
-        to: To = None,
         limit: Limit = 200,
     ) -> Response:
-        """Live and stored alerts that were raised within the given times, newest first."""
-        stored = store.alerts(state, from_, to, limit) if store is not None else []
+        """Live and stored alerts that were raised within the given times, newest first.
+
+        While the database does not answer, those of this run that are still in memory; `complete` is false then.
+        """
+        stored, complete = _unless_down(lambda: store.alerts(state, *span, limit) if store is not None else [])
         merged = {one["id"]: one for one in stored}
-        for id, row in live().items():
+        for id, row in in_memory().items():
             merged.pop(id, None)
-            if state in (None, "live", row["state"]) and _within(row["raised_at"], from_, to):
+            live = state == "live" and row["state"] != "cleared"
+            if (state is None or live or state == row["state"]) and _within(row["raised_at"], *span):
                 merged[id] = row
         rows = sorted(merged.values(), key=lambda row: (row["raised_at"], row["id"]), reverse=True)
-        return answer({"mode": mode, "alerts": rows[:limit]})
+        return answer({"mode": mode, "alerts": rows[:limit], "complete": complete})
 
     @router.get("/alerts/{id}", response_model=models.AlertLife, responses=problems(404, 422, 503), tags=["alerts"])
     def alert(id: AlertId) -> Response:
-        """One alert with every stored step of its life."""
-        changes = store.alert_changes(id) if store is not None else []
-        row = live().get(id) or (changes[-1]["alert"] if changes else None)
+        """One alert with every stored step of its life.
+
+        While the database does not answer, without these steps, if it is still in memory; `complete` is false then.
+        """
+        changes, complete = _unless_down(lambda: store.alert_changes(id) if store is not None else [])
+        row = in_memory().get(id) or (changes[-1]["alert"] if changes else None)
+        if row is None and not complete:
+            raise ApiProblem(503, "the database does not answer", headers={"Retry-After": "5"})
         if row is None:
             raise ApiProblem(404, f"there is no alert {id}")
-        return answer({"mode": mode, "alert": row, "changes": changes})
+        return answer({"mode": mode, "alert": row, "changes": changes, "complete": complete})
 
     @router.post(
         "/alerts/{id}/acknowledge",
@@ -195,6 +210,15 @@ def _runway_routes(router: APIRouter, context: Context) -> None:
             lambda: service.set_runway(name, open=order.open, in_use=order.in_use, visibility=order.visibility)
         )
         return answer({"mode": mode, "runway": context.wire.runway(made)})
+
+
+def _unless_down(ask: Callable[[], list[Row]]) -> tuple[list[Row], bool]:
+    """What the database says and True; nothing and False while it does not answer."""
+    try:
+        return ask(), True
+    except SQLAlchemyError as error:
+        log.warning("the database does not answer; told from memory: %s", type(error).__name__)
+        return [], False
 
 
 def _within(time: float, first: float | None, last: float | None) -> bool:

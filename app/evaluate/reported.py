@@ -47,14 +47,16 @@ def recorded_reports(path: Path) -> RecordedReports:
     if body[:1] == b"{":
         body = b"[" + b",".join(line for line in body.splitlines() if line.strip()) + b"]"
     try:
-        rows = decode_rows(body, TargetReportRow, MOST_REPORTS)
+        rows = decode_rows(body, TargetReportRow, MOST_REPORTS, "report")
         if not rows:
             raise RecordingError(f"{path}: has no target reports")
-        ground = [one for one in rows if one.on_ground] or rows
+        ground = [one for one in rows if one.on_ground or (one.on_ground is None and not one.altitude_m)] or rows
         # what lies beyond a pole is refused by the row that says it
         latitude = min(max(median(float(one.lat) for one in ground), -90.0), 90.0)
         longitude = min(max(median(float(one.lon) for one in ground), -180.0), 180.0)
-        reports = parse_target_reports(body, LocalFrame(latitude, longitude), MOST_REPORTS)
+        parsed = parse_target_reports(body, LocalFrame(latitude, longitude), MOST_REPORTS)
     except BadMessage as error:
         raise RecordingError(f"{path}: {error}") from error
-    return RecordedReports(reports, name=name_of(path))
+    if parsed.bad:
+        raise RecordingError(f"{path}: {parsed.bad[0].message}")
+    return RecordedReports(parsed.rows, name=name_of(path))

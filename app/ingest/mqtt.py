@@ -7,13 +7,13 @@ import logging
 import random
 import threading
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 from urllib.parse import unquote, urlsplit
 
 import aiomqtt
 
-from app.contract import Refused, RefusedTime
+from app.contract import Refused, RefusedRow, RefusedTime, Submitted
 from app.ingest.node_events import parse_node_events
 from app.ingest.wire_json import BadMessage
 from app.settings import MqttSettings
@@ -28,13 +28,13 @@ MESSAGE_LIMIT = 1000
 MESSAGE_BYTES = 256 * 1024
 QUEUED = 10_000
 
-Submit = Callable[[NodeEvents], Mapping[str, int]]
+Submit = Callable[[NodeEvents], Submitted]
 
 
 class _Service(Protocol):
     nodes: tuple[NodeSite, ...]
 
-    def submit_node_events(self, events: NodeEvents) -> dict[str, int]: ...
+    def submit_node_events(self, events: NodeEvents) -> Submitted: ...
 
 
 async def listen(
@@ -161,21 +161,24 @@ def _take(
     try:
         if len(body) > MESSAGE_BYTES:
             raise BadMessage("too_many", f"{len(body)} octets in one message; at most {MESSAGE_BYTES} are taken")
-        events = parse_node_events(body, nodes, MESSAGE_LIMIT, node=node_of_topic(topic, pattern))
-        submitted = submit(events)
+        parsed = parse_node_events(body, nodes, MESSAGE_LIMIT, node=node_of_topic(topic, pattern))
+        for bad in parsed.bad:
+            _note(bad.reason, topic, bad.message, counted)
+        submitted = submit(parsed.rows)
     except BadMessage as error:
-        _note(error.reason, topic, error, counted)
+        for bad in error.rows or [RefusedRow(0, error.reason, str(error))]:
+            _note(bad.reason, topic, bad.message, counted)
     except RefusedTime as error:
-        counted["events_refused"] += len(events)
-        _note("refused_time", topic, error, counted)
+        counted["events_refused"] += len(error.rows)
+        _note("refused_time", topic, str(error), counted)
     except Refused as error:
-        _note("refused", topic, error, counted)
+        _note("refused", topic, str(error), counted)
     else:
-        counted["events"] += submitted["taken"]
-        counted["events_refused"] += len(events) - submitted["taken"]
+        counted["events"] += submitted.taken
+        counted["events_refused"] += len(submitted.refused)
 
 
-def _note(reason: str, topic: str, error: Exception, counted: Counter[str]) -> None:
+def _note(reason: str, topic: str, why: str, counted: Counter[str]) -> None:
     counted[reason] += 1
     if counted[reason] == 1:
-        log.warning("mqtt: %s: %s (further ones of this kind are only counted)", topic, error)
+        log.warning("mqtt: %s: %s (further ones of this kind are only counted)", topic, why)

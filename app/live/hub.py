@@ -17,7 +17,7 @@ from app.live.messages import Resume
 from app.live.stream import Stream, TrackFilter, View
 from app.settings import Settings
 from app.wire import Row, Wire, encode
-from pipeline.picture import AlertChange, Picture
+from pipeline.picture import Alert, AlertChange, Picture
 
 log = logging.getLogger(__name__)
 
@@ -26,6 +26,10 @@ RESUME_MARGIN_S = 10.0
 
 WAITING_CHANGES = 10_000
 """Alert changes kept before the event loop has started."""
+
+
+RECENT_ALERTS = 1000
+"""Alerts kept in memory: what a page asks for at most, several times over; some 2 kB each."""
 
 
 class Follower(Protocol):
@@ -89,6 +93,11 @@ class Hub:
         self.status_version = 0
         self.on_start: list[Callable[[], None]] = []
         """Called on the event loop when it begins."""
+        self.on_picture: list[Callable[[Picture], None]] = []
+        """Called on the event loop with every picture that is numbered."""
+        self.recent: dict[int, Alert] = {}
+        """The newest alerts of this run by id, as they are now, so that they are known without the database. Other
+        threads may copy it."""
 
     def publish(self, picture: Picture, changes: tuple[AlertChange, ...]) -> None:
         """Take a new picture (a `PictureListener`); returns at once, never raises. The newest picture wins."""
@@ -265,6 +274,8 @@ class Hub:
                 self._follow(now)
             self._tick(now)
             self._status(picture, now)
+            for show in self.on_picture:
+                show(picture)
 
     def _begin_epoch(self, *, forget_alerts: bool) -> None:
         """What clients hold is void (a seek, or time stepped back): all of them start again.
@@ -274,6 +285,8 @@ class Hub:
         """
         self.epoch = secrets.token_hex(4)
         self.stream = Stream(self.stream.keep_s)
+        if forget_alerts:
+            self.recent.clear()
         self._alerts.clear()
         self._deltas.clear()
         self._snapshots.clear()
@@ -283,6 +296,10 @@ class Hub:
 
     def _alert(self, change: AlertChange, now: float) -> None:
         self.seq += 1
+        self.recent.pop(change.alert.id, None)
+        self.recent[change.alert.id] = change.alert
+        if len(self.recent) > RECENT_ALERTS:
+            del self.recent[next(iter(self.recent))]
         body = {"type": "alert", "epoch": self.epoch, "seq": self.seq, "time": change.time, "mode": self.settings.mode}
         text = encode({**body, "op": change.operation, "alert": self.wire.alert(change.alert)}).decode()
         self._alerts.append((self.seq, now, text))

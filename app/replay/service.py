@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, NoReturn
+from typing import Any, Literal, NoReturn
 
 from app.assembly import node_site, radar_site
-from app.contract import FrontEnd, PictureListener, Readiness, Refused, ReplayControl, UnknownId, Video
+from app.contract import FrontEnd, PictureListener, Readiness, Refused, ReplayControl, Submitted, UnknownId, Video
 from app.replay.player import JournalPlayer
 from app.replay.recorded import RecordedRun
 from pipeline.picture import Alert, Picture, RunwayState, SensorState, Visibility
@@ -76,13 +76,16 @@ class ReplayService:
         self._known(radar)
         self._refuse()
 
-    def submit_node_events(self, events: NodeEvents) -> dict[str, int]:
+    def submit_node_events(self, events: NodeEvents) -> Submitted:
         """Not in a replay."""
         self._refuse()
 
-    def submit_target_reports(self, reports: TargetReports) -> dict[str, int]:
+    def submit_target_reports(self, reports: TargetReports) -> Submitted:
         """Not in a replay."""
         self._refuse()
+
+    def note_bad_rows(self, feed: Literal["nodes", "reports"], counts: Mapping[str, int]) -> None:
+        """Nothing: what comes in during a replay is refused."""
 
     def _known(self, radar: str) -> None:
         if radar not in {one.id for one in self.radars}:

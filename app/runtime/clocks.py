@@ -12,6 +12,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from app.contract import RefusedRow
 from app.runtime.host_clock import HostClock
 from app.settings import ClockSettings
 from pipeline.picture import SensorState
@@ -113,27 +114,26 @@ class FeedTimes:
         self._words: tuple[float, str] = (-np.inf, "")
         self._lock = threading.Lock()
 
-    def judge(self, table: Rows, arrival: float) -> tuple[Rows, dict[str, int], str]:
-        """The rows to take, with their times; rows refused by reason; and why, for the sender."""
+    def judge(self, table: Rows, arrival: float) -> tuple[Rows, tuple[RefusedRow, ...]]:
+        """The rows to take, with their times; and those refused, with the reason for their sender."""
         if not len(table):
-            return table, {}, ""
+            return table, ()
         with self._lock:
             times, ok = table.time.copy(), np.ones(len(table), np.bool_)
-            refused: Counter[str] = Counter()
-            answer = ""
+            refused: list[RefusedRow] = []
             for name, rows in self._by_sender(table):
                 sender = self._sender(name)
                 verdict = sender.clock.take(table.time[rows], arrival)
                 times[rows], ok[rows] = verdict.time, verdict.ok
                 if verdict.refused:
-                    refused.update(verdict.refused)
+                    who = f"{name}: " if name else ""
+                    refused += [RefusedRow(int(rows[k]), reason, who + why) for k, reason, why in verdict.refused]
                     sender.refused_at = sender.heard
-                    sender.refused += sum(verdict.refused.values())
-                    answer = answer or f"{name}{': ' if name else ''}{verdict.answer}"
+                    sender.refused += len(verdict.refused)
                     self._told = (self._steady(), verdict.words)
-            self._refused.update(refused)
+            self._refused.update(one.reason for one in refused)
             self._forget()
-        return table[ok].replace(time=times[ok], arrival=arrival), dict(refused), answer
+        return table[ok].replace(time=times[ok], arrival=arrival), tuple(sorted(refused))
 
     def words(self) -> str:
         """What was refused lately, for a person; empty when nothing was."""

@@ -13,6 +13,9 @@ from app.settings import ROOT
 
 MIGRATIONS = ROOT / "migrations"
 BUSY_MS = 10_000
+PATIENCE = {"connect_timeout": 3, "tcp_user_timeout": 5_000}
+"""Seconds for a connection to PostgreSQL, and ms for what was sent to be acknowledged: a host that is gone gives no
+answer at all, and who asks is to be told so."""
 
 
 def open_engine(url: str) -> Engine:
@@ -21,7 +24,7 @@ def open_engine(url: str) -> Engine:
     if parsed.drivername in ("postgresql", "postgres"):
         parsed = parsed.set(drivername="postgresql+psycopg")
     if parsed.get_backend_name() != "sqlite":
-        return create_engine(parsed, pool_pre_ping=True)
+        return create_engine(parsed, pool_pre_ping=True, connect_args=PATIENCE)
     if parsed.database and parsed.database != ":memory:":
         Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
     engine = create_engine(parsed)

@@ -85,7 +85,7 @@ def router(view: View, settings: Settings) -> APIRouter:
 
     @made.get("/3d")
     async def redirect() -> Response:
-        return RedirectResponse("/3d/", status_code=308)
+        return RedirectResponse("3d/", status_code=308)
 
     @made.api_route("/3d/", methods=["GET", "HEAD"])
     def page(request: Request) -> Response:
@@ -238,7 +238,7 @@ def _banner(mode: str) -> str:
         "display:flex;gap:8px;align-items:center"
     )
     link = (
-        '<a href="/" style="color:#9fd4ff;text-decoration:none;background:#10161ce0;padding:5px 10px;'
+        '<a href="../" style="color:#9fd4ff;text-decoration:none;background:#10161ce0;padding:5px 10px;'
         'border:1px solid #34424f;border-radius:4px">&#8592; 2D display</a>'
     )
     words = {"demo": "DEMO: recorded traffic, simulated sensors", "replay": "REPLAY of a recording"}.get(mode)

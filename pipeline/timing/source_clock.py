@@ -45,16 +45,15 @@ class ClockRules:
 
 
 class Verdict(NamedTuple):
-    """time: (n,) UTC s, to be used where ok. ok: (n,) bool. refused: rows by reason ("ahead", "behind", "invalid").
-
-    words, answer: why the first refused row was, for a status line and for the sender; empty when none was.
+    """time: (n,) UTC s, to be used where ok. ok: (n,) bool. words: why the first refused row was, for a status line;
+    empty when none was. refused: of each refused row its place and reason ("ahead", "behind", "invalid"), and the
+    sentence for its sender.
     """
 
     time: Floats
     ok: NDArray[np.bool_]
-    refused: dict[str, int]
     words: str = ""
-    answer: str = ""
+    refused: tuple[tuple[int, str, str], ...] = ()
 
 
 class SourceClock:
@@ -92,23 +91,18 @@ class SourceClock:
         if self.rules.mode == "arrival":
             if finite.any():
                 self._estimate.push(float(offset[finite].max()), arrival)
-            return Verdict(np.full(len(stated), arrival), np.ones(len(stated), np.bool_), {})
+            return Verdict(np.full(len(stated), arrival), np.ones(len(stated), np.bool_))
         if within.any():
             self._estimate.push(float(offset[within].max()), arrival)
             self._refused_offset = None
         time = np.where(within, self._corrected(stated, arrival), stated)
         if within.all():
-            return Verdict(time, within, {})
+            return Verdict(time, within)
         if not within.any() and finite.any():
             self._refused_offset = float(np.median(offset[finite]))
-        counts = {
-            "ahead": int((finite & ~within & (offset > 0)).sum()),
-            "behind": int((finite & ~within & (offset < 0)).sum()),
-            "invalid": int((~finite).sum()),
-        }
-        first = int(np.argmin(within))
-        why = (float(offset[first]), float(stated[first]))
-        return Verdict(time, within, {name: n for name, n in counts.items() if n}, describe(*why), sentence(*why))
+        off = [(int(k), float(offset[k]), float(stated[k])) for k in np.flatnonzero(~within)]
+        refused = tuple((k, _reason(one), sentence(one, at)) for k, one, at in off)
+        return Verdict(time, within, describe(*off[0][1:]), refused)
 
     def _corrected(self, stated: Floats, arrival: float) -> Floats:
         if self.rules.mode == "taken":
@@ -117,3 +111,9 @@ class SourceClock:
         time = stated - self._estimate.value if self._correcting else stated
         limit = arrival if self._correcting else arrival + AHEAD_S
         return np.where(time > limit, arrival, time)
+
+
+def _reason(offset: float) -> str:
+    if not math.isfinite(offset):
+        return "invalid"
+    return "ahead" if offset > 0 else "behind"

@@ -74,7 +74,7 @@ function tryForm(path, call) {
   form.append(make("button", {}, "try it"), out);
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
-    let target = path;
+    let target = `..${path}`;
     const query = new URLSearchParams();
     for (const parameter of call.parameters ?? []) {
       const value = inputs.get(parameter.name)?.value ?? "";
@@ -143,7 +143,7 @@ function place(id) {
 
 async function main() {
   const [open, live] = await Promise.all(
-    ["/openapi.json", "/asyncapi.json"].map(async (path) => (await fetch(path)).json()),
+    ["../openapi.json", "../asyncapi.json"].map(async (path) => (await fetch(path)).json()),
   );
   place("about").replaceChildren(
     make("p", {}, `${open.info.title} ${open.info.version}: ${open.info.summary ?? ""}`),

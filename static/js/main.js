@@ -65,7 +65,7 @@ settings.onSet = () => saveView();
 /** @type {import('./feed/live.js').LinkState} */
 let link = 'connecting';
 const feed = new LiveFeed({
-  url: `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/api/v1/live`,
+  url: new URL('api/v1/live', document.baseURI).href.replace(/^http/, 'ws'),
   position: () => picture.position(),
   onState: (state) => { link = state; },
   onMessage: (message) => {

@@ -161,7 +161,7 @@ def test_tracks_coast_and_end_and_alerts_clear_though_nothing_is_accepted(
 ) -> None:
     """An airliner on a closed runway, then only reports of a wrong time, or none; then good ones again."""
     monkeypatch.setattr("app.runtime.surface_worker.TICK_S", 0.02)
-    monkeypatch.setattr("app.service.SENSOR_SILENT_S", 0.5)
+    monkeypatch.setattr("app.runtime.feeds.SENSOR_SILENT_S", 0.5)
     clock = Standing()
     running = Running(tmp_path, clock=HostClock(clock, clock))
     try:
@@ -330,14 +330,14 @@ def test_without_a_radar_silent_reports_make_the_picture_degraded(
         assert running.ask("POST", path, json={**row, "time": time.time()}).status_code == 200
         until(lambda: running.time() > 0, "the report is taken")
         assert not engine.sensors_degraded
-        monkeypatch.setattr("app.service.SENSOR_SILENT_S", 0.2)
+        monkeypatch.setattr("app.runtime.feeds.SENSOR_SILENT_S", 0.2)
         wrong = {**row, "time": time.time() + 3600}
         until(
             lambda: running.ask("POST", path, json=wrong).status_code == 422 and engine.sensors_degraded,
             "nothing was accepted any more",
         )
         assert running.sensor("reports").status == "degraded"
-        monkeypatch.setattr("app.service.SENSOR_SILENT_S", 10.0)
+        monkeypatch.setattr("app.runtime.feeds.SENSOR_SILENT_S", 10.0)
         assert running.ask("POST", path, json={**row, "time": time.time()}).status_code == 200
         until(lambda: not engine.sensors_degraded, "it is well again")
     finally:

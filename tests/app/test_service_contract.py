@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.contract import Refused, RefusedTime, Service, UnknownId, WrongParts
+from app.contract import Refused, RefusedTime, Service, Submitted, UnknownId, WrongParts
 from app.ingest.octets import encode_sweeps
 from app.service import SurfaceService
 from pipeline.picture import AlertChange, Picture
@@ -227,19 +227,30 @@ class ServiceContract:
                 rig.service.submit_sweeps(HEARD, wrong)
 
     def test_nothing_submitted_is_nothing_done(self, rig: Rig) -> None:
-        assert rig.service.submit_node_events(NodeEvents.empty()) == {"taken": 0}
-        assert rig.service.submit_target_reports(TargetReports.empty()) == {"taken": 0}
+        assert rig.service.submit_node_events(NodeEvents.empty()) == Submitted(0)
+        assert rig.service.submit_target_reports(TargetReports.empty()) == Submitted(0)
 
     def test_what_is_dated_wrongly_is_refused_by_name_and_the_rest_is_taken(self, rig: Rig) -> None:
         now = time.time()
         with pytest.raises(RefusedTime, match="ahead") as told:
             rig.service.submit_target_reports(report(time=now + 3600.0))
-        assert told.value.counts == {"ahead": 1}
-        both = TargetReports.build(2, time=np.array([now, now + 3600.0]), address="39ffff", east=1e6, north=0.0)
-        assert rig.service.submit_target_reports(both) == {"taken": 1, "refused_ahead": 1}
+        assert [(one.row, one.reason) for one in told.value.rows] == [(0, "ahead")]
+        both = TargetReports.build(2, time=np.array([now + 3600.0, now]), address="39ffff", east=1e6, north=0.0)
+        submitted = rig.service.submit_target_reports(both)
+        assert submitted.taken == 1
+        assert [(one.row, one.reason) for one in submitted.refused] == [(0, "ahead")]
         with pytest.raises(RefusedTime):
             rig.service.submit_node_events(NodeEvents.build(1, time=now + 3600.0, node=0))
         assert {one.status for one in rig.service.sensors() if one.kind in ("node", "report")} == {"degraded"}
+
+    def test_rows_that_could_not_be_read_are_counted_with_their_feed(self, rig: Rig) -> None:
+        def counted(id: str) -> int:
+            return sum(one.counters.get("refused_bad_value", 0) for one in rig.service.sensors() if one.id == id)
+
+        before = counted("reports"), counted("nodes")
+        rig.service.note_bad_rows("reports", {"bad_value": 2})
+        rig.service.note_bad_rows("nodes", {"bad_value": 1})
+        assert (counted("reports"), counted("nodes")) == (before[0] + 2, before[1] + 1)
 
     def test_events_of_unknown_nodes_do_not_stop_the_pictures(self, rig: Rig) -> None:
         rig.service.submit_node_events(NodeEvents.build(2, time=time.time(), node=np.array([-1, 99])))

@@ -10,15 +10,26 @@ import contextlib
 import tempfile
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from app.assembly import FRONT_END, build_parts, chain_of
-from app.contract import FrontEnd, PictureListener, Readiness, Refused, RefusedTime, ReplayControl, UnknownId, Video
+from app.contract import (
+    FrontEnd,
+    PictureListener,
+    Readiness,
+    Refused,
+    RefusedTime,
+    ReplayControl,
+    Submitted,
+    UnknownId,
+    Video,
+)
 from app.ingest.octets import OctetIntake
 from app.runtime.clocks import FeedTimes
 from app.runtime.front_end import FrontEndSwitch
@@ -83,6 +94,7 @@ class FakeService:
         self.node_events: list[NodeEvents] = []
         self.target_reports: list[TargetReports] = []
         self.sweeps: list[Sweeps] = []
+        self.bad_rows: dict[str, Counter[str]] = {"nodes": Counter(), "reports": Counter()}
         self._times = {
             "nodes": FeedTimes("event", self.settings.clocks.nodes, [one.id for one in self.nodes]),
             "reports": FeedTimes("report", self.settings.clocks.reports),
@@ -254,11 +266,13 @@ class FakeService:
     def sensors(self) -> tuple[SensorState, ...]:
         now = self.clock()
         events, reports = (sum(map(len, tables)) for tables in (self.node_events, self.target_reports))
-        heard = SensorState("reports", "report", "ok", now, counters={"taken": reports})
+        heard = SensorState("reports", "report", "ok", now, counters={"taken": reports, **self._bad("reports")})
         others = (
-            self._times["nodes"].shown(SensorState("nodes", "node", "ok", now, True, counters={"taken": 7 + events})),
+            self._times["nodes"].shown(
+                SensorState("nodes", "node", "ok", now, True, counters={"taken": 7 + events, **self._bad("nodes")})
+            ),
         )
-        if reports or self._times["reports"].has_refused:
+        if reports or self._times["reports"].has_refused or self.bad_rows["reports"]:
             others += (self._times["reports"].shown(heard),)
         return (
             SensorState(
@@ -271,6 +285,9 @@ class FakeService:
             ),
             *others,
         )  # fmt: skip
+
+    def _bad(self, feed: str) -> dict[str, int]:
+        return {f"refused_{reason}": count for reason, count in self.bad_rows[feed].items()}
 
     def video(self, radar: str) -> Video:
         site = next((one for one in self.radars if one.id == radar), None)
@@ -353,24 +370,27 @@ class FakeService:
         self.sweeps += blocks
         return counted
 
-    def submit_node_events(self, events: NodeEvents) -> dict[str, int]:
+    def submit_node_events(self, events: NodeEvents) -> Submitted:
         return self._take("nodes", events, self.node_events)
 
-    def submit_target_reports(self, reports: TargetReports) -> dict[str, int]:
+    def submit_target_reports(self, reports: TargetReports) -> Submitted:
         return self._take("reports", reports, self.target_reports)
 
-    def _take(self, kind: str, table: Any, tables: list[Any]) -> dict[str, int]:
+    def note_bad_rows(self, feed: Literal["nodes", "reports"], counts: Mapping[str, int]) -> None:
+        self.bad_rows[feed].update(counts)
+
+    def _take(self, kind: str, table: Any, tables: list[Any]) -> Submitted:
         self._started()
-        good, refused, why = self._times[kind].judge(table, time.time())
+        good, refused = self._times[kind].judge(table, time.time())
         if refused and not len(good):
-            raise RefusedTime(why, refused)
+            raise RefusedTime(refused[0].message, refused)
         with self._lock:
             if self._waiting >= self.settings.limits.rows_queued:
                 raise Refused(f"the queue for {kind} is full")
             if len(good):
                 self._waiting += 1
                 tables.append(good)
-        return {"taken": len(good), **{f"refused_{reason}": count for reason, count in refused.items()}}
+        return Submitted(len(good), refused)
 
 
 def main() -> None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import uvicorn
+from fastapi import APIRouter
 
 from app.api.application import create_app
 from app.live.hub import Hub
@@ -44,12 +45,20 @@ class Server:
 
 @contextlib.contextmanager
 def running(
-    folder: Path | None = None, *, feed: FeedSettings | None = None, limits: LimitsSettings | None = None, **fake: Any
+    folder: Path | None = None,
+    *,
+    feed: FeedSettings | None = None,
+    limits: LimitsSettings | None = None,
+    root_path: str = "",
+    view3d: Callable[[FakeService], APIRouter] | None = None,
+    **fake: Any,
 ) -> Iterator[Server]:
-    """Serve a fake service that stands still until the test calls `service.step()`."""
+    """Serve a fake service that stands still until the test calls `service.step()`. view3d: makes its routes."""
     replay: FakeReplay | None = fake.get("replay")
     mode = "demo" if replay is None else "replay"
-    settings = settings_for_tests(mode=mode, feed=feed or FeedSettings(), limits=limits or LimitsSettings())
+    settings = settings_for_tests(
+        mode=mode, feed=feed or FeedSettings(), limits=limits or LimitsSettings(), root_path=root_path
+    )
     service = FakeService(settings, **fake)
     hub = Hub(service, settings)
     if replay is not None:
@@ -60,7 +69,7 @@ def running(
         store = Store(f"sqlite:///{folder / 'airside.sqlite3'}", settings, service.airport)
         store.start()
         service.listen(store.record)
-    app = create_app(service, hub=hub, store=store)
+    app = create_app(service, hub=hub, store=store, view3d_router=view3d(service) if view3d is not None else None)
     config = uvicorn.Config(
         app, host="127.0.0.1", port=0, log_config=None, ws="websockets-sansio", ws_per_message_deflate=False,
         timeout_graceful_shutdown=2, access_log=False,

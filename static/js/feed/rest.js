@@ -18,17 +18,17 @@ async function call(path, init = {}, limitMs = 10000) {
 }
 
 /** @returns {Promise<any>} the airport as GeoJSON */
-export const fetchAirport = async () => (await call('/api/v1/airport.geojson', {}, 30000)).json();
+export const fetchAirport = async () => (await call('api/v1/airport.geojson', {}, 30000)).json();
 
 /** @returns {Promise<import('../types.js').Alert[]>} the alerts cleared last, newest first; none when nothing is stored */
 export async function fetchCleared() {
-  const document = await (await call('/api/v1/alerts?state=cleared&limit=20')).json();
+  const document = await (await call('api/v1/alerts?state=cleared&limit=20')).json();
   return Array.isArray(document?.alerts) ? document.alerts : [];
 }
 
 /** @param {number} id @param {string} by @returns {Promise<any>} */
 export async function acknowledge(id, by) {
-  const response = await call(`/api/v1/alerts/${id}/acknowledge`, {
+  const response = await call(`api/v1/alerts/${id}/acknowledge`, {
     method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify({ by }),
   });
   return response.json().catch(() => null);
@@ -36,35 +36,35 @@ export async function acknowledge(id, by) {
 
 /** @param {string} id @param {Record<string, unknown>} change @returns {Promise<any>} */
 export async function setRunway(id, change) {
-  const response = await call(`/api/v1/runways/${encodeURIComponent(id)}/state`, {
+  const response = await call(`api/v1/runways/${encodeURIComponent(id)}/state`, {
     method: 'PUT', headers: { 'content-type': 'application/json' }, body: JSON.stringify(change),
   });
   return response.json().catch(() => null);
 }
 
 /** @param {string} radar @returns {Promise<import('../types.js').RadarParts>} */
-export const fetchParts = async (radar) => (await call(`/api/v1/radars/${encodeURIComponent(radar)}/parts`)).json();
+export const fetchParts = async (radar) => (await call(`api/v1/radars/${encodeURIComponent(radar)}/parts`)).json();
 
 /**
  * Have other parts work on a radar's video; they may have to be compiled first.
  * @param {string} radar @param {Record<string, {name: string}>} order @returns {Promise<import('../types.js').RadarParts>}
  */
 export async function chooseParts(radar, order) {
-  const response = await call(`/api/v1/radars/${encodeURIComponent(radar)}/parts`, {
+  const response = await call(`api/v1/radars/${encodeURIComponent(radar)}/parts`, {
     method: 'PUT', headers: { 'content-type': 'application/json' }, body: JSON.stringify(order),
   }, 120000);
   return response.json();
 }
 
 /** @returns {Promise<import('../types.js').ReplayState>} where the replay stands */
-export const fetchReplay = async () => (await call('/api/v1/replay', { cache: 'no-store' }, 4000)).json();
+export const fetchReplay = async () => (await call('api/v1/replay', { cache: 'no-store' }, 4000)).json();
 
 /**
  * @param {{playing?: boolean, speed?: number, time?: number}} order what is left out stays
  * @returns {Promise<import('../types.js').ReplayState>}
  */
 export async function steerReplay(order) {
-  const response = await call('/api/v1/replay', {
+  const response = await call('api/v1/replay', {
     method: 'PUT', headers: { 'content-type': 'application/json' }, body: JSON.stringify(order),
   }, 60000);
   return response.json();
@@ -86,7 +86,7 @@ export async function steerReplay(order) {
  * @returns {Promise<VideoPicture|null>}
  */
 export async function fetchVideo(radar, projection, ink) {
-  const response = await call(`/api/v1/radars/${encodeURIComponent(radar)}/video.png?palette=${ink}`, { cache: 'no-store' });
+  const response = await call(`api/v1/radars/${encodeURIComponent(radar)}/video.png?palette=${ink}`, { cache: 'no-store' });
   const corners = cornersOf(response.headers, projection);
   if (!corners) return null;
   const image = await createImageBitmap(await response.blob());

@@ -70,7 +70,8 @@ def test_answers_are_as_the_document_says(client: httpx.Client) -> None:
         answer = client.get(PATH).json() if verb == "get" else put(client, {"playing": True})
         jsonschema_rs.Draft202012Validator(whole).validate(answer)
     order = document["paths"][PATH]["put"]["requestBody"]["content"]["application/json"]["schema"]
-    assert set(order["properties"]) == {"playing", "speed", "time"}
+    assert order == {"$ref": "#/components/schemas/ReplayOrder"}
+    assert set(document["components"]["schemas"]["ReplayOrder"]["properties"]) == {"playing", "speed", "time"}
 
 
 def test_it_plays_at_the_pace_that_is_asked_for_and_pauses(client: httpx.Client, stands: list[float]) -> None:

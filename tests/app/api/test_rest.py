@@ -39,6 +39,11 @@ READS = [
     ("/api/v1/alerts?state=live", 200),
     ("/api/v1/alerts?state=wrong", 422),
     ("/api/v1/alerts?from=2026-01-01T00:00:00Z&to=2026-01-02T00:00:00%2B01:00", 200),
+    ("/api/v1/alerts?from=1760000001&to=1760000000", 422),
+    ("/api/v1/alerts?from=2026-01-02T00:00:00Z&to=2026-01-02T00:30:00%2B01:00", 422),
+    ("/api/v1/alerts?from=1760000000&to=1760000000", 200),
+    ("/api/v1/history/tracks?from=1760000001&to=1760000000", 422),
+    ("/api/v1/tracks/1/history?from=1760000001&to=1760000000", 422),
     ("/api/v1/alerts/999", 404),
     ("/api/v1/airport.geojson", 200),
     ("/api/v1/sensors", 200),
@@ -50,6 +55,12 @@ READS = [
     ("/metrics", 200),
     ("/data/aircraft.json", 200),
     ("/data/receiver.json", 200),
+    ("/data/history_0.json", 200),
+    ("/data/history_9999.json", 404),
+    ("/data/history_x.json", 422),
+    ("/chunks/chunks.json", 200),
+    ("/chunks/current.json", 200),
+    ("/chunks/nothing.json", 404),
     ("/api/v1/nothing", 404),
     ("/nothing.html", 404),
     ("/..%2f..%2fpyproject.toml", 404),
@@ -312,28 +323,6 @@ def test_scan_conversion_finds_the_nearest_cell() -> None:
                 assert apart[row] <= apart.min() + 1e-9
             else:
                 assert table[i, j] == 64 * 40
-
-
-def test_readsb_conventions(http: httpx.Client, server: Server) -> None:
-    body = http.get("/data/aircraft.json").json()
-    rows = {row["id"]: row for row in http.get("/api/v1/tracks").json()["tracks"]}
-    assert len(body["aircraft"]) == len(rows)
-    assert isinstance(body["now"], float)
-    for one in body["aircraft"]:
-        assert re.fullmatch(r"~?[0-9a-f]{6}", one["hex"])
-        assert None not in one.values()
-        assert one["alt_baro"] == "ground"
-        assert {"seen", "seen_pos", "messages", "mlat", "tisb", "type", "lat", "lon", "gs"} <= set(one)
-        assert len(one.get("flight", "12345678")) == 8
-    fast = next(one for one in body["aircraft"] if one["hex"] == "390000")
-    assert fast["gs"] == round(rows[1]["speed_mps"] * 3600 / 1852, 1)
-    vehicle = next(one for one in body["aircraft"] if one["hex"] == "390002")
-    assert (vehicle["category"], vehicle["type"]) == ("C2", "adsb_icao_nt")
-    unknown = next(one for one in body["aircraft"] if one["hex"].startswith("~"))
-    assert "flight" not in unknown
-    assert unknown["type"] == "tisb_trackfile"
-    receiver = http.get("/data/receiver.json").json()
-    assert {"version", "refresh", "history", "lat", "lon"} <= set(receiver)
 
 
 def test_metrics_count_by_reason(http: httpx.Client) -> None:

@@ -8,9 +8,10 @@ from collections import Counter
 from collections.abc import Callable
 
 import aiomqtt
+import numpy as np
 import pytest
 
-from app.contract import Refused, RefusedTime
+from app.contract import Refused, RefusedRow, RefusedTime, Submitted
 from app.ingest.mqtt import MqttThread, _take, listen, node_of_topic, parse_url
 from app.settings import MqttSettings
 from pipeline.sites import NodeSite
@@ -61,14 +62,15 @@ def test_every_message_is_taken_or_counted_by_reason() -> None:
     got: list[NodeEvents] = []
     counted: Counter[str] = Counter()
 
-    def submit(events: NodeEvents) -> dict[str, int]:
+    def submit(events: NodeEvents) -> Submitted:
         if events.time.max() > 2e9:
-            raise RefusedTime("time is 3,600 s ahead of this host", {"ahead": len(events)})
-        if len(got) == 3:
+            why = "time is 3,600 s ahead of this host"
+            raise RefusedTime(why, [RefusedRow(row, "ahead", why) for row in range(len(events))])
+        if len(got) == 4:
             raise Refused("the queue for nodes is full")
         got.append(events)
-        late = int((events.time < 1.6e9).sum())
-        return {"taken": len(events) - late, "refused_behind": late}
+        late = np.flatnonzero(events.time < 1.6e9).tolist()
+        return Submitted(len(events) - len(late), tuple(RefusedRow(row, "behind", "late") for row in late))
 
     for topic, payload in [
         ("airside/nodes/A1/events", b'{"time": 1700000000}'),
@@ -77,16 +79,17 @@ def test_every_message_is_taken_or_counted_by_reason() -> None:
         ("airside/nodes/C3/events", b'{"time": 1700000000}'),
         ("airside/nodes/A1/events", b'{"time": NaN}'),
         ("airside/nodes/A1/events", b'[{"time": 1500000000}, {"time": 1700000000}]'),
+        ("airside/nodes/A1/events", b'[{"time": "soon"}, {"time": 1700000000}, {"time": 1700000000, "node": "B2"}]'),
         ("airside/nodes/A1/events", b'[{"time": 2500000000}, {"time": 2500000000}]'),
         ("airside/nodes/A1/events", None),
         ("airside/nodes/A1/events", b"[" + b" " * 300_000 + b"]"),
         ("airside/nodes/A1/events", b'{"time": 1700000000}'),
     ]:
         _take(topic, payload, PATTERN, NODES, submit, counted)
-    assert [one.node.tolist() for one in got] == [[0], [1, 1], [0, 0]]
+    assert [one.node.tolist() for one in got] == [[0], [1, 1], [0, 0], [0]]
     assert counted == {
-        "messages": 10, "events": 4, "wrong_node": 1, "unknown_node": 1, "bad_json": 2, "too_many": 1, "refused": 1,
-        "events_refused": 3, "refused_time": 1,
+        "messages": 11, "events": 5, "wrong_node": 2, "bad_value": 1, "unknown_node": 1, "bad_json": 2, "too_many": 1,
+        "refused": 1, "events_refused": 3, "refused_time": 1,
     }  # fmt: skip
 
 
@@ -95,7 +98,7 @@ async def test_without_a_broker_it_tries_again_and_can_be_ended() -> None:
         taken.bind(("127.0.0.1", 0))
         counted: Counter[str] = Counter()
         settings = MqttSettings(url=f"mqtt://127.0.0.1:{taken.getsockname()[1]}")
-        task = asyncio.create_task(listen(settings, NODES, lambda _: {}, counted))
+        task = asyncio.create_task(listen(settings, NODES, lambda _: Submitted(0), counted))
         await until(lambda: counted["connect_failures"] >= 2)
         task.cancel()
         with pytest.raises(asyncio.CancelledError):
@@ -107,9 +110,9 @@ class Service:
         self.nodes = NODES
         self.got: list[NodeEvents] = []
 
-    def submit_node_events(self, events: NodeEvents) -> dict[str, int]:
+    def submit_node_events(self, events: NodeEvents) -> Submitted:
         self.got.append(events)
-        return {"taken": len(events)}
+        return Submitted(len(events))
 
 
 def test_the_thread_ends_when_told() -> None:

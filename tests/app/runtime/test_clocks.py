@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from app.contract import RefusedRow
 from app.runtime.clocks import (
     MOST_SENDERS,
     REFUSED_TOLD_S,
@@ -39,11 +40,13 @@ def state() -> SensorState:
 def test_refused_reports_make_their_source_degraded_for_a_while() -> None:
     steady = Steady()
     feed = FeedTimes("report", ClockSettings(), steady=steady)
-    good, refused, why = feed.judge(reports(3600.0, -0.2, 3601.0), NOW)
+    good, refused = feed.judge(reports(3600.0, -0.2, 3601.0), NOW)
     assert good.time.tolist() == [NOW - 0.2]
     assert good.arrival.tolist() == [NOW]
-    assert refused == {"ahead": 2}
-    assert why == "time is 3,600 s ahead of this host: local time?"
+    assert refused == (
+        RefusedRow(0, "ahead", "time is 3,600 s ahead of this host: local time?"),
+        RefusedRow(2, "ahead", "time is 3,601 s ahead of this host: local time?"),
+    )
     shown = feed.shown(state())
     assert (shown.status, shown.detail) == ("degraded", "2 reports ahead 3,600 s refused: local time?")
     assert shown.counters == {"taken": 1, "refused_ahead": 2, "clock_steps": 0}
@@ -61,11 +64,10 @@ def test_refused_reports_make_their_source_degraded_for_a_while() -> None:
 def test_each_node_has_its_own_clock() -> None:
     feed = FeedTimes("event", ClockSettings(), ["A1", "B2"])
     events = NodeEvents.build(4, node=[0, 1, 0, 1], time=NOW + np.array([0.7, 18.0, 0.6, 0.0]))
-    good, refused, why = feed.judge(events, NOW)
+    good, refused = feed.judge(events, NOW)
     assert good.node.tolist() == [0, 0, 1]
     assert good.time.tolist() == pytest.approx([NOW, NOW - 0.1, NOW])
-    assert refused == {"ahead": 1}
-    assert why == "B2: time is 18 s ahead of this host: GPS time?"
+    assert refused == (RefusedRow(1, "ahead", "B2: time is 18 s ahead of this host: GPS time?"),)
     assert feed.words() == "B2 1 event ahead 18 s refused: GPS time?"
 
 
@@ -77,8 +79,8 @@ def test_a_wrong_clock_of_one_address_does_not_move_the_times_of_the_others() ->
     feed = FeedTimes("report", ClockSettings())
     for second in range(30):
         now = NOW + second
-        good, refused, _ = feed.judge(addressed(["39abcd", "39ffff", ""], -0.1, 4.5, -0.2, at=now), now)
-        assert refused == {}
+        good, refused = feed.judge(addressed(["39abcd", "39ffff", ""], -0.1, 4.5, -0.2, at=now), now)
+        assert refused == ()
         assert good.time.tolist() == pytest.approx([now - 0.1, now, now - 0.2])
     assert feed.shown(state()).clock_offset_s == 4.5
 
@@ -86,9 +88,9 @@ def test_a_wrong_clock_of_one_address_does_not_move_the_times_of_the_others() ->
 def test_who_was_refused_is_said_or_how_many() -> None:
     steady = Steady()
     feed = FeedTimes("report", ClockSettings(), steady=steady)
-    _, refused, why = feed.judge(addressed(["39ffff", "39abcd", "39ffff"], 18.0, 0.0, 18.0), NOW)
-    assert refused == {"ahead": 2}
-    assert why == "39ffff: time is 18 s ahead of this host: GPS time?"
+    _, refused = feed.judge(addressed(["39ffff", "39abcd", "39ffff"], 18.0, 0.0, 18.0), NOW)
+    told = "39ffff: time is 18 s ahead of this host: GPS time?"
+    assert refused == (RefusedRow(0, "ahead", told), RefusedRow(2, "ahead", told))
     assert feed.words() == "39ffff 2 reports ahead 18 s refused: GPS time?"
     steady.now += WORDS_EVERY_S
     feed.judge(addressed(["39abcd"], 18.0), NOW)

@@ -39,7 +39,7 @@ def errors(fed: list[tuple[float, float, Verdict]]) -> np.ndarray:
 
 
 def refused(fed: list[tuple[float, float, Verdict]]) -> int:
-    return sum(sum(verdict.refused.values()) for _, _, verdict in fed)
+    return sum(len(verdict.refused) for _, _, verdict in fed)
 
 
 @pytest.mark.parametrize(
@@ -54,23 +54,22 @@ def refused(fed: list[tuple[float, float, Verdict]]) -> int:
 def test_far_off_is_refused_by_name(offset: float, reason: str, words: str) -> None:
     clock = SourceClock(ClockRules())
     fed = feed(clock, lambda _: offset, jitter=0.0)
-    assert all(not verdict.ok[0] and verdict.refused == {reason: 1} for _, _, verdict in fed)
+    assert all(not verdict.ok[0] and [one[:2] for one in verdict.refused] == [(0, reason)] for _, _, verdict in fed)
     assert all(verdict.words.startswith(words) for _, _, verdict in fed)
     assert clock.offset == pytest.approx(offset, abs=0.01)
 
 
 def test_uptime_is_refused_by_name() -> None:
     verdict = SourceClock(ClockRules()).take(np.array([123.4]), NOW)
-    assert verdict.refused == {"behind": 1}
     assert verdict.words == "behind 57 years: counts from its own start?"
-    assert verdict.answer.startswith("time is 57 years behind this host")
+    assert [one[:2] for one in verdict.refused] == [(0, "behind")]
+    assert verdict.refused[0][2].startswith("time is 57 years behind this host")
 
 
 def test_no_time_is_refused_as_invalid() -> None:
     verdict = SourceClock(ClockRules()).take(np.array([np.nan, NOW, np.inf]), NOW)
     assert verdict.ok.tolist() == [False, True, False]
-    assert verdict.refused == {"invalid": 2}
-    assert verdict.answer == "time is not a number"
+    assert verdict.refused == ((0, "invalid", "time is not a number"), (2, "invalid", "time is not a number"))
 
 
 def test_only_the_wrong_rows_are_refused() -> None:
@@ -78,7 +77,10 @@ def test_only_the_wrong_rows_are_refused() -> None:
     verdict = clock.take(NOW + np.array([-0.2, 3600.0, -0.1, -9.0]), NOW)
     assert verdict.ok.tolist() == [True, False, True, False]
     assert verdict.time[verdict.ok].tolist() == [NOW - 0.2, NOW - 0.1]
-    assert verdict.refused == {"ahead": 1, "behind": 1}
+    assert verdict.refused == (
+        (1, "ahead", "time is 3,600 s ahead of this host: local time?"),
+        (3, "behind", "time is 9.0 s behind this host"),
+    )
     assert clock.offset == pytest.approx(-0.1)
 
 
@@ -150,7 +152,7 @@ def test_what_is_refused_moves_nothing(times: list[float]) -> None:
     feed(other, lambda _: 0.7, seconds=10)
     verdict = clock.take(stated, NOW + 10)
     assert not verdict.ok.any()
-    assert sum(verdict.refused.values()) == len(stated)
+    assert len(verdict.refused) == len(stated)
     good = np.array([NOW + 11.5])
     assert clock.take(good, NOW + 11).time.tolist() == other.take(good, NOW + 11).time.tolist()
 

@@ -1,0 +1,77 @@
+"""What holds for every request: HEAD beside GET, and who may read across origins."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.support.running import Server
+
+FOREIGN = {"origin": "https://map.example"}
+
+
+def get_paths(document: dict[str, Any]) -> list[str]:
+    values = {"{id}": "1", "{number}": "0", "{name}": "current.json"}
+    paths = [path for path, calls in document["paths"].items() if "get" in calls]
+    for name, value in values.items():
+        paths = [path.replace(name, value) for path in paths]
+    return [*paths, "/", "/docs", "/docs/", "/docs/docs.js", "/openapi.json", "/nothing.html", "/api/v1/nothing"]
+
+
+def test_head_is_answered_wherever_get_is(http: httpx.Client) -> None:
+    paths = get_paths(http.get("/openapi.json").json())
+    assert len(paths) > 20
+    for path in paths:
+        got, head = http.get(path), http.head(path)
+        assert head.status_code == got.status_code, path
+        assert head.content == b"", path
+        assert head.headers["content-type"] == got.headers["content-type"] if got.content else True, path
+        assert "content-length" in head.headers, path
+
+
+def test_head_tells_the_length_of_what_stands_still(http: httpx.Client) -> None:
+    for path in ("/", "/docs/docs.js", "/api/v1/airport.geojson"):
+        assert http.head(path).headers["content-length"] == str(len(http.get(path).content))
+
+
+def test_where_get_is_not_head_is_not_either(http: httpx.Client) -> None:
+    answer = http.head("/api/v1/nodes/events")
+    assert (answer.status_code, answer.headers["allow"]) == (405, "POST")
+
+
+def test_head_stands_among_the_methods_that_are_allowed(http: httpx.Client) -> None:
+    assert http.delete("/api/v1/picture").headers["allow"] == "GET, HEAD"
+
+
+@pytest.mark.parametrize(
+    "path", ["/data/aircraft.json", "/data/receiver.json", "/data/history_9999.json", "/data/none"]
+)
+def test_pages_of_any_origin_may_read_what_is_made_for_them(http: httpx.Client, path: str) -> None:
+    assert http.get(path, headers=FOREIGN).headers["access-control-allow-origin"] == "*"
+    assert http.head(path, headers=FOREIGN).headers["access-control-allow-origin"] == "*"
+    asked = http.options(path, headers={**FOREIGN, "access-control-request-method": "GET"})
+    assert asked.status_code == 204
+    assert asked.headers["access-control-allow-origin"] == "*"
+    assert asked.headers["access-control-allow-methods"] == "GET, HEAD, OPTIONS"
+    assert asked.headers["access-control-allow-headers"] == "*"
+    assert "access-control-allow-credentials" not in asked.headers
+
+
+@pytest.mark.parametrize(
+    "path", ["/", "/api/v1/picture", "/api/v1/targets/reports", "/chunks/chunks.json", "/metrics", "/datas", "/docs/"]
+)
+def test_nothing_else_may_be_read_across_origins(http: httpx.Client, path: str) -> None:
+    for answer in (
+        http.get(path, headers=FOREIGN),
+        http.options(path, headers={**FOREIGN, "access-control-request-method": "POST"}),
+    ):
+        assert not [name for name in answer.headers if name.startswith("access-control")]
+
+
+def test_nothing_can_be_written_where_everyone_may_read(http: httpx.Client, server: Server) -> None:
+    for method in ("POST", "PUT", "DELETE"):
+        assert http.request(method, "/data/aircraft.json").status_code == 405
+    paths = httpx.get(f"{server.url}/openapi.json").json()["paths"]
+    assert [path for path, calls in paths.items() if path.startswith("/data") and set(calls) != {"get"}] == []
