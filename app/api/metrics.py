@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from fastapi import APIRouter
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
@@ -11,10 +11,25 @@ from prometheus_client.registry import Collector
 from starlette.responses import Response
 
 from app.api.context import Context
+from app.api.units import unit_of
 from app.wire import CLASSES, PHASES
-from pipeline.picture import Picture
+from pipeline.picture import Picture, SensorState
 
 STATUS = ("ok", "degraded", "silent", "waiting")
+
+FEED: dict[str, tuple[str, dict[str, str]]] = {
+    "connections": (
+        "connections to the live feed, by what became of them",
+        {name: name for name in ("closed_lagging", "refused_full", "refused_origin")} | {"served": "clients_served"},
+    ),
+    "messages": ("messages of the live feed", {"sent": "messages_sent", "bad": "bad_messages"}),
+    "deltas": ("deltas of the live feed", {"encoded": "deltas_encoded", "merged": "merged_deltas"}),
+}
+"""The metrics of the live feed: the unit, what it is about, and of each event its counter."""
+
+TABLES = ("points", "tracks", "alert_changes", "node_events", "sensor_states")
+TRANSACTIONS = {"written": "transactions", "retried": "retries", "refused": "refused"}
+"""Outcomes of what the database writer tried, and their counters."""
 
 
 def metrics_router(context: Context) -> APIRouter:
@@ -55,11 +70,6 @@ class ServiceCollector(Collector):
         yield from self._store()
 
     def _sensors(self) -> Iterator[Metric]:
-        counts = CounterMetricFamily(
-            "airside_sensor_events",
-            "what a sensor delivered and what was dropped, by reason",
-            labels=["sensor", "reason"],
-        )
         status = GaugeMetricFamily(
             "airside_sensor_status", "1 for the state a sensor is in", labels=["sensor", "status"]
         )
@@ -67,44 +77,62 @@ class ServiceCollector(Collector):
             "airside_sensor_clock_offset_seconds", "a sensor's clock less the time of arrival", labels=["sensor"]
         )
         last = GaugeMetricFamily("airside_sensor_last_seconds", "Unix time of the newest data", labels=["sensor"])
-        for sensor in self.context.service.sensors():
-            for reason, count in sensor.counters.items():
-                counts.add_metric([sensor.id, reason], count)
+        sensors = self.context.service.sensors()
+        for sensor in sensors:
             for name in STATUS:
                 status.add_metric([sensor.id, name], float(sensor.status == name))
             if sensor.last is not None:
                 last.add_metric([sensor.id], sensor.last)
             if sensor.clock_offset_s is not None:
                 offset.add_metric([sensor.id], sensor.clock_offset_s)
-        yield from (counts, status, last, offset)
+        yield from (*_counts(sensors), status, last, offset)
 
     def _feed(self) -> Iterator[Metric]:
         hub = self.context.hub
         yield GaugeMetricFamily("airside_feed_clients", "connected clients of the live feed", value=len(hub.clients))
-        yield CounterMetricFamily("airside_pictures", "pictures and alert changes numbered", value=hub.seq)
-        events = CounterMetricFamily("airside_feed_events", "what happened on the live feed", labels=["event"])
-        for name in (
-            "clients_served",
-            "messages_sent",
-            "deltas_encoded",
-            "merged_deltas",
-            "closed_lagging",
-            "refused_full",
-            "refused_origin",
-            "bad_messages",
-        ):
-            events.add_metric([name], hub.counters[name])
-        yield events
+        yield CounterMetricFamily("airside_pictures", "pictures that were numbered", value=hub.counters["pictures"])
+        changes = hub.counters["alert_changes"]
+        yield CounterMetricFamily("airside_alert_changes", "alert changes that were numbered", value=changes)
+        for unit, (about, events) in FEED.items():
+            counts = CounterMetricFamily(f"airside_feed_{unit}", about, labels=["event"])
+            for event, counter in events.items():
+                counts.add_metric([event], hub.counters[counter])
+            yield counts
 
     def _store(self) -> Iterator[Metric]:
         if self.context.store is None:
             return
-        counts = CounterMetricFamily("airside_store_events", "what the database writer did", labels=["event"])
-        for name, value in self.context.store.writer_counters().items():
-            counts.add_metric([name], value)
-        yield counts
+        counters = self.context.store.writer_counters()
+        rows = CounterMetricFamily(
+            "airside_store_rows", "rows that the database writer wrote or dropped", labels=["table", "outcome"]
+        )
+        for table in TABLES:
+            rows.add_metric([table, "written"], counters.get(table, 0))
+            rows.add_metric([table, "dropped"], counters.get(f"{table}_dropped", 0))
+        yield rows
+        transactions = CounterMetricFamily(
+            "airside_store_transactions", "transactions of the database writer", labels=["outcome"]
+        )
+        for outcome, counter in TRANSACTIONS.items():
+            transactions.add_metric([outcome], counters.get(counter, 0))
+        yield transactions
+        failed = counters.get("failed", 0)
+        yield CounterMetricFamily("airside_store_pictures_failed", "pictures that could not be recorded", value=failed)
         queued = self.context.store.queued()
         yield GaugeMetricFamily("airside_store_queue", "batches that wait for the database writer", value=queued)
+
+
+def _counts(sensors: Iterable[SensorState]) -> Iterator[Metric]:
+    """What the sensors delivered and what was dropped, a metric for each unit."""
+    made: dict[str, Metric] = {}
+    for sensor in sensors:
+        for reason, count in sensor.counters.items():
+            unit = unit_of(sensor.kind, reason)
+            if unit not in made:
+                about = f"{unit} that a sensor delivered or that were dropped, by reason"
+                made[unit] = CounterMetricFamily(f"airside_sensor_{unit}", about, labels=["sensor", "reason"])
+            made[unit].add_metric([sensor.id, reason], count)  # type: ignore[attr-defined]
+    yield from made.values()
 
 
 def _of_picture(picture: Picture) -> Iterator[Metric]:

@@ -269,6 +269,7 @@ class Hub:
             self._alert(change, now)
         if picture is not None:
             self.seq += 1
+            self.counters["pictures"] += 1
             self.picture, self.picture_seq = picture, self.seq
             if anew or wound_back:
                 self._follow(now)
@@ -296,6 +297,7 @@ class Hub:
 
     def _alert(self, change: AlertChange, now: float) -> None:
         self.seq += 1
+        self.counters["alert_changes"] += 1
         self.recent.pop(change.alert.id, None)
         self.recent[change.alert.id] = change.alert
         if len(self.recent) > RECENT_ALERTS:

@@ -325,23 +325,6 @@ def test_scan_conversion_finds_the_nearest_cell() -> None:
                 assert table[i, j] == 64 * 40
 
 
-def test_metrics_count_by_reason(http: httpx.Client) -> None:
-    from prometheus_client.parser import text_string_to_metric_families
-
-    text = http.get("/metrics").text
-    samples = {
-        (sample.name, *sorted(sample.labels.items())): sample.value
-        for family in text_string_to_metric_families(text)
-        for sample in family.samples
-    }
-    assert samples["airside_sensor_events_total", ("reason", "lost"), ("sensor", "smr-1")] == 3
-    assert samples["airside_sensor_status", ("sensor", "smr-2"), ("status", "silent")] == 1
-    assert sum(value for key, value in samples.items() if key[0] == "airside_tracks") == 12
-    assert samples["airside_stage_seconds", ("stage", "detect")] == 0.0011
-    assert ("airside_store_events_total", ("event", "points_dropped")) in samples
-    assert ("airside_feed_clients",) in samples
-
-
 def test_not_ready_is_said(http: httpx.Client, server: Server) -> None:
     server.service.ready = False
     try:
