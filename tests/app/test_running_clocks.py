@@ -120,7 +120,9 @@ def test_one_datum_of_another_time_is_refused_and_changes_nothing_else(
     assert all(one.status != "degraded" for one in running.service.sensors() if one.id != kind)
 
     answer = running.ask("POST", path, json=[{**row, "time": time.time()}, {**row, "time": wrong(now)}])
-    assert (answer.status_code, answer.json()) == (200, {"taken": 1, f"refused_{reason}": 1})
+    told = answer.json()
+    assert (answer.status_code, told["taken"], told[f"refused_{reason}"]) == (200, 1, 1)
+    assert [(one["index"], one["reason"]) for one in told["errors"]] == [(1, reason)]
     good = time.time()
     assert running.ask("POST", path, json={**row, "time": good}).json() == {"taken": 1}
     until(lambda: running.time() >= good - 0.001, "the good one is in the picture")
