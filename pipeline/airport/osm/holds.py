@@ -1,6 +1,6 @@
 """Holding positions: each given to its runway and turned towards it; the missing ones derived.
 
-Distances: ICAO Annex 14 Volume I, table 3-2 (by runway code number, see osm_runways.HOLD_DISTANCE).
+Distances: ICAO Annex 14 Volume I, table 3-2 (by runway code number, see runways.HOLD_DISTANCE).
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from shapely.geometry import LineString, Point
 
 from pipeline.airport.frame import LocalFrame
 from pipeline.airport.model import Feature
-from pipeline.airport.osm_elements import Element, point_of
-from pipeline.airport.osm_runways import (
+from pipeline.airport.osm.elements import Element, point_of
+from pipeline.airport.osm.runways import (
     HOLD_DISTANCE,
     LOW_VISIBILITY_DISTANCE,
     RunwayDraft,

@@ -13,7 +13,7 @@ from shapely.geometry import LineString, Point, Polygon
 
 from pipeline.airport.frame import LocalFrame
 from pipeline.airport.model import Feature
-from pipeline.airport.osm_elements import Element, area_of, is_area, lines_of, metres, point_of
+from pipeline.airport.osm.elements import Element, area_of, is_area, lines_of, metres, point_of
 
 TAXIWAY_WIDTH = {4: 23.0, 3: 15.0, 2: 10.5, 1: 7.5}
 """Default width by the airport's greatest runway code number (ICAO Annex 14, 3.9.5)."""

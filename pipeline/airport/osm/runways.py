@@ -16,7 +16,7 @@ import shapely
 from shapely.geometry import LineString, MultiPolygon, Point, Polygon
 
 from pipeline.airport.frame import LocalFrame
-from pipeline.airport.osm_elements import Element, area_of, is_area, lines_of, metres, point_of
+from pipeline.airport.osm.elements import Element, area_of, is_area, lines_of, metres, point_of
 
 HOLD_DISTANCE = {4: 90.0, 3: 75.0, 2: 40.0, 1: 40.0}
 """Metres from the centreline to a holding position, by runway code number."""

@@ -19,20 +19,18 @@ from shapely.geometry.polygon import orient
 
 from pipeline.airport.frame import LocalFrame
 from pipeline.airport.model import Feature
-from pipeline.airport.osm_elements import Element, ImportFault, area_of, is_area, lines_of, metres, read_extract
-from pipeline.airport.osm_holds import make_holds
-from pipeline.airport.osm_runways import (
+from pipeline.airport.osm.elements import Element, ImportFault, area_of, is_area, lines_of, metres, read_extract
+from pipeline.airport.osm.holds import make_holds
+from pipeline.airport.osm.runways import (
     DEFAULT_WIDTH,
     HOLD_DISTANCE,
     LOW_VISIBILITY_DISTANCE,
     RunwayDraft,
     make_runways,
 )
-from pipeline.airport.osm_surfaces import make_surfaces
+from pipeline.airport.osm.surfaces import make_surfaces
 from pipeline.airport.runway_access import taxi_lanes
 from pipeline.airport.taxi_graph import build_taxi_graph
-
-__all__ = ["ATTRIBUTION", "LICENCE", "ImportFault", "airport_geojson"]
 
 ATTRIBUTION = "© OpenStreetMap contributors, ODbL 1.0"
 LICENCE = "https://opendatacommons.org/licenses/odbl/1-0/"
