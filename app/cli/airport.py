@@ -12,29 +12,33 @@ airport = typer.Typer(no_args_is_help=True, help="Import, show and list airport 
 
 @airport.command("import")
 def import_(
-    file: Annotated[Path, typer.Argument(help="Overpass extract (JSON, asked for with `out geom`).")],
+    file: Annotated[Path, typer.Argument(help="Extract: Overpass JSON, OSM XML, or GeoJSON of overpass-turbo.")],
     icao: Annotated[str, typer.Option(help="ICAO code of the airport in it, such as LFPO.")],
     output: Annotated[Path | None, typer.Option(help="Where to write the map; ICAO.geojson here by default.")] = None,
     name: Annotated[str | None, typer.Option(help="Name, when the extract does not tell it.")] = None,
+    elevation: Annotated[
+        float | None, typer.Option(help="Metres above mean sea level, when the extract does not tell them.")
+    ] = None,
 ) -> None:
     """Make an airport map (GeoJSON) of an OpenStreetMap extract.
 
     Get an extract from any Overpass server with, for example,
     [bold]\\[out:json];nwr\\["aeroway"](48.70,2.28,48.77,2.42);out geom;[/bold]
-    (and the buildings and roads of the same box). What the map does not tell (widths, heights, missing holding
-    positions) is derived at the values of ICAO Annex 14, marked in the file, and counted in the summary.
+    (and the buildings and roads of the same box); `out body; >; out skel;`, the exports of overpass-turbo and files of
+    openstreetmap.org do as well. What the map does not tell (widths, heights, missing holding positions) is derived at
+    the values of ICAO Annex 14 and marked in the file. The summary counts what was derived, left out or not used, and
+    says what to check. An extract that the server cut off, or without a runway in use, is refused.
     """
     import json
 
     from pipeline.airport.geojson import AirportFault, airport_from_geojson
-    from pipeline.airport.osm import ImportFault, airport_geojson
+    from pipeline.airport.osm import ImportFault, airport_geojson, parse_extract
 
     try:
-        extract = json.loads(file.read_text(encoding="utf-8"))
-        document = airport_geojson(extract, icao, name)
+        document = airport_geojson(parse_extract(file.read_bytes()), icao, name, elevation=elevation)
         airport_from_geojson(document)
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        _fail(f"{file}: cannot be read as JSON ({error})")
+    except OSError as error:
+        _fail(f"{file}: cannot be read ({error})")
     except (ImportFault, AirportFault) as error:
         _fail(f"{file}: {error}")
     target = output or Path(f"{document['icao']}.geojson")
@@ -89,11 +93,15 @@ def _summarise(document: dict[str, Any]) -> None:
 
     counts = Counter(one["properties"]["kind"] for one in document["features"])
     typer.echo(f"{document.get('icao', '')}  {document.get('name', '')}")
+    elevation = document.get("elevation_m")
+    typer.echo(f"Elevation: {'not known' if elevation is None else f'{elevation:g} m'}")
     _table("Features", dict(sorted(counts.items())))
     told = document.get("import")
     if isinstance(told, dict):
         _table("Derived, not in the source", told.get("derived"))
         _table("Left out", told.get("left_out"))
+        _table("Not used", told.get("not_used"))
+        _list("To check", told.get("to_check"))
     typer.echo(f"\n{document.get('attribution', '')}")
 
 
@@ -103,6 +111,13 @@ def _table(title: str, rows: Any) -> None:
     typer.echo(f"\n{title}")
     for name, count in rows.items():
         typer.echo(f"  {count:6}  {name}")
+
+
+def _list(title: str, sentences: Any) -> None:
+    if isinstance(sentences, list) and sentences:
+        typer.echo(f"\n{title}")
+        for one in sentences:
+            typer.echo(f"  - {one}")
 
 
 def _fail(message: str) -> NoReturn:

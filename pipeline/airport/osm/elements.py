@@ -1,14 +1,11 @@
-"""Reading OpenStreetMap elements (Overpass JSON with the geometry inline) into shapes in the local frame.
-
-Source: https://wiki.openstreetmap.org/wiki/Overpass_API/Overpass_QL#Output_Format_(out:json), "out geom".
-"""
+"""OpenStreetMap elements: what their tags mean, and their shapes in the local frame."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -21,8 +18,15 @@ from pipeline.airport.frame import LocalFrame
 Position = tuple[float, float]
 
 FEET = 0.3048
+LOWEST, HIGHEST = -450.0, 6000.0
+"""Metres above mean sea level between which all aerodromes lie: the Dead Sea shore at -430, Daocheng at 4411."""
 LIFECYCLE = ("disused", "abandoned", "razed", "demolished", "removed", "destroyed", "was", "historic")
 PLANNED = ("construction", "proposed", "planned")
+DECIDING = (
+    "runway", "stopway", "taxiway", "taxilane", "apron", "holding_position", "parking_position", "threshold",
+    "displaced_threshold", "terminal", "hangar", "control_tower", "tower", "aerodrome",
+)  # fmt: skip
+"""Of several aeroway values of one element the first of these decides what it is."""
 
 
 class ImportFault(ValueError):
@@ -33,7 +37,8 @@ class ImportFault(ValueError):
 class Element:
     """One element of the extract. parts: one list of (longitude, latitude) a way, with its role, or one point.
 
-    id: "way/123". status: "" in use, "closed" for disused ones, "planned" for those not built yet.
+    id: "way/123". status: "" in use, "closed" for disused ones, "planned" for those not built yet. gaps: how many of
+    its points the extract does not hold.
     """
 
     id: str
@@ -41,11 +46,12 @@ class Element:
     tags: dict[str, str]
     parts: tuple[tuple[str, tuple[Position, ...]], ...]
     status: str = ""
+    gaps: int = 0
 
     @property
     def aeroway(self) -> str:
-        """The value of the aeroway key, looked for behind the prefixes of things out of use as well."""
-        return aeroway_of(self.tags)
+        """The value of the aeroway key that decides, looked for behind the prefixes of things out of use as well."""
+        return next(iter(aeroways_of(self.tags)), "")
 
     @property
     def name(self) -> str:
@@ -54,111 +60,51 @@ class Element:
 
 
 @dataclass
-class Extract:
-    """All readable elements and how many were left out, by reason."""
+class Findings:
+    """What an import has to tell beside the map.
 
-    elements: list[Element] = field(default_factory=list)
-    dropped: Counter[str] = field(default_factory=Counter)
+    left_out: how many elements the map should have had, by reason. not_used: how many it has no use for, by value.
+    to_check: sentences for whoever knows the airport.
+    """
+
+    left_out: Counter[str] = field(default_factory=Counter)
+    not_used: Counter[str] = field(default_factory=Counter)
+    to_check: list[str] = field(default_factory=list)
 
 
-def aeroway_of(tags: dict[str, str]) -> str:
-    """The aeroway value of these tags, whatever prefix it stands behind; "" when there is none."""
-    plain = tags.get("aeroway", "")
-    if plain in PLANNED or plain in LIFECYCLE:
-        return tags.get(plain, "") or plain
+def values_of(text: str) -> list[str]:
+    """The values of a tag, which mappers join with semicolons: "runway;taxiway"."""
+    return [one for one in (part.strip() for part in text.split(";")) if one]
+
+
+def aeroways_of(tags: dict[str, str]) -> list[str]:
+    """The aeroway values of these tags, whatever prefix they stand behind, the one that decides first."""
+    plain = values_of(tags.get("aeroway", ""))
+    hidden = next((one for one in plain if one in PLANNED or one in LIFECYCLE), None)
+    if hidden:
+        return _ranked(values_of(tags.get(hidden, ""))) or [hidden]
     if plain:
-        return plain
+        return _ranked(plain)
     for prefix in (*LIFECYCLE, *PLANNED):
-        if found := tags.get(f"{prefix}:aeroway", ""):
-            return found
-    return tags.get("area:aeroway", "")
+        if found := values_of(tags.get(f"{prefix}:aeroway", "")):
+            return _ranked(found)
+    return _ranked(values_of(tags.get("area:aeroway", "")))
+
+
+def _ranked(values: list[str]) -> list[str]:
+    return sorted(values, key=lambda one: DECIDING.index(one) if one in DECIDING else len(DECIDING))
 
 
 def status_of(tags: dict[str, str]) -> str:
     """The value of Element.status that these tags mean."""
-    plain = tags.get("aeroway", "")
-    if plain in PLANNED or (not plain and any(f"{one}:aeroway" in tags for one in PLANNED)):
+    plain = values_of(tags.get("aeroway", ""))
+    if any(one in PLANNED for one in plain) or (not plain and any(f"{one}:aeroway" in tags for one in PLANNED)):
         return "planned"
-    if plain in LIFECYCLE or (not plain and any(f"{one}:aeroway" in tags for one in LIFECYCLE)):
+    if any(one in LIFECYCLE for one in plain) or (not plain and any(f"{one}:aeroway" in tags for one in LIFECYCLE)):
         return "closed"
-    if any(tags.get(one) == "yes" for one in LIFECYCLE) or tags.get("runway") == "closed":
+    if any(tags.get(one) == "yes" for one in ("closed", *LIFECYCLE)) or tags.get("runway") == "closed":
         return "closed"
     return "planned" if any(tags.get(one) == "yes" for one in PLANNED) else ""
-
-
-def read_extract(extract: Any) -> Extract:
-    """Every element with usable geometry. Raises ImportFault when this is not an Overpass document."""
-    if not isinstance(extract, dict):
-        raise ImportFault("not an OpenStreetMap extract: the document is not a JSON object")
-    elements = extract.get("elements")
-    if not isinstance(elements, list):
-        raise ImportFault(
-            'not an Overpass extract: it has no list "elements" (ask Overpass for [out:json] and "out geom")'
-        )
-    made = Extract()
-    seen: set[str] = set()
-    for raw in elements:
-        reason = _read_element(raw, made, seen)
-        if reason:
-            made.dropped[reason] += 1
-    return made
-
-
-def _read_element(raw: Any, made: Extract, seen: set[str]) -> str:
-    if not isinstance(raw, dict) or raw.get("type") not in ("node", "way", "relation"):
-        return "not an element"
-    tags = raw.get("tags")
-    if not isinstance(tags, dict) or not tags:
-        return "no tags"
-    tags = {str(key): str(value).strip() for key, value in tags.items() if isinstance(value, str | int | float)}
-    id = f"{raw['type']}/{raw.get('id', 0)}"
-    if id in seen:
-        return "element repeated"
-    parts = tuple(_parts(raw))
-    if not parts:
-        return "no geometry"
-    seen.add(id)
-    made.elements.append(Element(id, raw["type"], tags, parts, status_of(tags)))
-    return ""
-
-
-def _parts(raw: dict[str, Any]) -> Iterator[tuple[str, tuple[Position, ...]]]:
-    if raw["type"] == "node":
-        position = _position(raw)
-        if position is not None:
-            yield "", (position,)
-    elif raw["type"] == "way":
-        positions = _positions(raw.get("geometry"))
-        if len(positions) >= 2:
-            yield "", positions
-    else:
-        members = raw.get("members")
-        for member in members if isinstance(members, list) else []:
-            if not isinstance(member, dict) or member.get("type") != "way":
-                continue
-            positions = _positions(member.get("geometry"))
-            if len(positions) >= 2:
-                yield str(member.get("role") or "outer"), positions
-
-
-def _positions(geometry: Any) -> tuple[Position, ...]:
-    made: list[Position] = []
-    for raw in geometry if isinstance(geometry, list) else []:
-        position = _position(raw)  # Overpass writes null for the nodes that a bounding box cut off
-        if position is not None and (not made or made[-1] != position):
-            made.append(position)
-    return tuple(made)
-
-
-def _position(raw: Any) -> Position | None:
-    if not isinstance(raw, dict):
-        return None
-    latitude, longitude = raw.get("lat"), raw.get("lon")
-    if not isinstance(latitude, int | float) or not isinstance(longitude, int | float):
-        return None
-    if not (-90 <= latitude <= 90 and -180 <= longitude <= 180):
-        return None
-    return float(longitude), float(latitude)
 
 
 def point_of(element: Element, frame: LocalFrame) -> Point:
@@ -249,3 +195,17 @@ def metres(text: str | None, least: float, most: float) -> float | None:
     if (found[2] or "m").lower() in ("ft", "feet", "foot", "'"):
         value *= FEET
     return value if least <= value <= most else None
+
+
+_ELEVATION = re.compile(r"^\s*([+-]?[0-9]+(?:[.,][0-9]+)?)\s*(m|metres?|meters?|ft|feet|foot|')?\s*$", re.IGNORECASE)
+
+
+def elevation_of(text: str | None) -> float | None:
+    """Metres above mean sea level from an "ele" tag ("432", "-3.7", "1416 ft"); None when it is none or not likely."""
+    found = _ELEVATION.match(text or "")
+    if not found:
+        return None
+    value = float(found[1].replace(",", "."))
+    if (found[2] or "m").lower() in ("ft", "feet", "foot", "'"):
+        value *= FEET
+    return value if LOWEST <= value <= HIGHEST else None

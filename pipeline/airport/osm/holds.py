@@ -16,14 +16,9 @@ from shapely.geometry import LineString, Point
 
 from pipeline.airport.frame import LocalFrame
 from pipeline.airport.model import Feature
-from pipeline.airport.osm.elements import Element, point_of
-from pipeline.airport.osm.runways import (
-    HOLD_DISTANCE,
-    LOW_VISIBILITY_DISTANCE,
-    RunwayDraft,
-    read_designators,
-    runway_id,
-)
+from pipeline.airport.osm.designators import numbers_and_sides, read_designators, runway_id, sorted_ends
+from pipeline.airport.osm.elements import Element, point_of, values_of
+from pipeline.airport.osm.runways import HOLD_DISTANCE, LOW_VISIBILITY_DISTANCE, RunwayDraft
 from pipeline.airport.runway_access import Access, Lanes, walk_outward
 
 REACH = 700.0
@@ -75,7 +70,7 @@ def _read(
     point = point_of(element, frame)
     told = (element.tags.get("holding_position:type") or element.tags.get("holding_position") or "").lower()
     kind = "untyped"
-    if told in ("runway", "hold_short"):
+    if {"runway", "hold_short"} & set(values_of(told)):
         kind = "CAT_I"
     elif any(one in told for one in LOW_VISIBILITY):
         kind = "CAT_II_III"
@@ -93,9 +88,13 @@ def _runway_in(ref: str, runways: Sequence[RunwayDraft]) -> tuple[str, str]:
     """(runway id or "", name) from what mappers write: "W37@07/25", "24-06", "A1", "NO ENTRY"."""
     name, _, place = ref.partition("@")
     designators = read_designators(place or name)
-    known = {runway_id(one.designators): one.id for one in runways}
-    wanted = known.get(runway_id(designators), "") if designators else ""
-    if not place and (designators or "ENTRY" in name.upper()):
+    wanted = ""
+    if designators:
+        exact = [one.id for one in runways if runway_id(one.designators) == runway_id(designators)]
+        near = [one.id for one in runways if numbers_and_sides(one.designators) == sorted_ends(designators)]
+        wanted = next(iter(exact or near), "")
+    a_runway = designators and (wanted or numbers_and_sides(designators) == sorted_ends(designators))
+    if not place and (a_runway or "ENTRY" in name.upper()):
         name = ""
     return wanted, re.sub(r"\s+", " ", name).strip()
 

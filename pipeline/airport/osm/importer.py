@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,23 @@ from shapely.geometry.polygon import orient
 
 from pipeline.airport.frame import LocalFrame
 from pipeline.airport.model import Feature
-from pipeline.airport.osm.elements import Element, ImportFault, area_of, is_area, lines_of, metres, read_extract
+from pipeline.airport.osm.elements import (
+    HIGHEST,
+    LOWEST,
+    Element,
+    Findings,
+    ImportFault,
+    Position,
+    aeroways_of,
+    area_of,
+    elevation_of,
+    is_area,
+    lines_of,
+    metres,
+)
 from pipeline.airport.osm.holds import make_holds
+from pipeline.airport.osm.reading import read_extract
+from pipeline.airport.osm.runway_parts import OVERRUNS
 from pipeline.airport.osm.runways import (
     DEFAULT_WIDTH,
     HOLD_DISTANCE,
@@ -28,7 +44,7 @@ from pipeline.airport.osm.runways import (
     RunwayDraft,
     make_runways,
 )
-from pipeline.airport.osm.surfaces import make_surfaces
+from pipeline.airport.osm.surfaces import BUILDING_AEROWAYS, make_surfaces
 from pipeline.airport.runway_access import taxi_lanes
 from pipeline.airport.taxi_graph import build_taxi_graph
 
@@ -39,34 +55,72 @@ FURTHEST = 25_000.0
 BEYOND = 1_500.0
 """Metres from runways, taxiways and aprons beyond which buildings and roads are left out."""
 PAVED = ("runway", "taxiway", "taxilane", "apron")
+USED = (*PAVED, *OVERRUNS, *BUILDING_AEROWAYS, "parking_position", "gate", "holding_position", "threshold",
+        "displaced_threshold", "aerodrome")  # fmt: skip
+"""Values of aeroway that become part of the map."""
 
 
-def airport_geojson(extract: dict[str, Any], icao: str, name: str | None = None) -> dict[str, Any]:
-    """One FeatureCollection (longitude, latitude) of the airport `icao` in an Overpass extract with inline geometry.
+def airport_geojson(
+    extract: Any, icao: str, name: str | None = None, *, elevation: float | None = None
+) -> dict[str, Any]:
+    """One FeatureCollection (longitude, latitude) of the airport `icao` in an extract of OpenStreetMap.
 
-    extract: the JSON document of an Overpass query that ends in "out geom". name: of the airport, when the extract has
-    no aerodrome element that tells it. Top-level members besides the features: icao, name, reference, attribution,
-    licence and `import` (features by kind, what was derived, what was left out and why).
-    Raises ImportFault when the document is no such extract or holds no runway, taxiway or apron.
+    extract: a document of `parse_extract`: Overpass JSON with the geometry inline or with the nodes beside, GeoJSON of
+    overpass-turbo, or OpenStreetMap XML. name: of the airport, when the extract has no aerodrome element that tells
+    it. elevation: metres above mean sea level; by default that of the aerodrome element, or of the highest runway that
+    has one. Top-level members besides the features: icao, name, reference, elevation_m (when it is known), attribution,
+    licence and `import` (features by kind, what was derived, what was left out or not used and why, what to check).
+    Raises ImportFault when the document is no such extract, or an incomplete one, or has no runway in use.
     """
     code = icao.strip().upper()
     if not (len(code) in (3, 4) and code.isalnum()):
         raise ImportFault(f"{icao!r} is not an ICAO code: four letters or digits, such as LFPO")
-    read = read_extract(extract)
-    aerodrome = _aerodrome(read.elements, code)
-    frame = _frame(read.elements)
-    elements = _belonging(read.elements, aerodrome, frame, read.dropped)
-    features = _features(elements, frame, read.dropped)
-    return {
+    if elevation is not None and not LOWEST <= elevation <= HIGHEST:
+        raise ImportFault(f"an elevation of {elevation} m is not between {LOWEST:.0f} and {HIGHEST:.0f} m")
+    findings = Findings()
+    read = _in_one_piece(read_extract(extract, findings))
+    aerodrome = _aerodrome(read, code)
+    frame = _frame(read)
+    elements = _belonging(read, aerodrome, frame, findings)
+    features = _features(elements, frame, findings)
+    height = elevation if elevation is not None else _elevation(aerodrome, elements)
+    _tell(elements, features, height, findings)
+    made: dict[str, Any] = {
         "type": "FeatureCollection",
         "icao": code,
         "name": name or _name(aerodrome) or code,
         "reference": {"latitude": frame.latitude, "longitude": frame.longitude},
+        "elevation_m": None if height is None else round(height, 1),
         "attribution": ATTRIBUTION,
         "licence": LICENCE,
-        "import": _summary(features, read.dropped),
+        "import": _summary(features, findings),
         "features": [_geojson(one, frame) for one in features],
     }
+    return {key: value for key, value in made.items() if value is not None}
+
+
+def _in_one_piece(elements: list[Element]) -> list[Element]:
+    """Longitudes without the step at the antimeridian: those of an airport on it go on beyond 180 degrees."""
+    told = [one for one in elements if one.aeroway in PAVED]
+    every = np.array([position[0] for one in told for _, part in one.parts for position in part])
+    if not len(every) or np.ptp(every) <= 180.0:
+        return elements
+    turned = np.radians(every)
+    middle = math.degrees(math.atan2(np.sin(turned).mean(), np.cos(turned).mean()))
+
+    def moved(part: tuple[Position, ...]) -> tuple[Position, ...]:
+        return tuple((middle + (longitude - middle + 180.0) % 360.0 - 180.0, latitude) for longitude, latitude in part)
+
+    return [replace(one, parts=tuple((role, moved(part)) for role, part in one.parts)) for one in elements]
+
+
+def _elevation(aerodrome: Element | None, elements: list[Element]) -> float | None:
+    """Of the aerodrome, or the highest of its runways: it is the elevation of the highest point of the landing area."""
+    told = elevation_of(aerodrome.tags.get("ele")) if aerodrome is not None else None
+    if told is not None:
+        return told
+    heights = [elevation_of(one.tags.get("ele")) for one in elements if one.aeroway == "runway" and not one.status]
+    return max((one for one in heights if one is not None), default=None)
 
 
 def _aerodrome(elements: list[Element], code: str) -> Element | None:
@@ -97,22 +151,23 @@ def _frame(elements: list[Element]) -> LocalFrame:
             near = [p for p in positions if _apart(p, (longitude, latitude)) < FURTHEST]
             west_south, east_north = np.min(near or positions, axis=0), np.max(near or positions, axis=0)
             middle = (west_south + east_north) / 2
-            return LocalFrame(round(float(middle[1]), 7), round(float(middle[0]), 7))
+            longitude = (float(middle[0]) + 180.0) % 360.0 - 180.0
+            return LocalFrame(round(float(middle[1]), 7), round(longitude, 7))
     raise ImportFault("the extract holds no runway, taxiway or apron with geometry: is it an extract of an airport?")
 
 
 def _apart(one: Any, other: Any) -> float:
-    east = (one[0] - other[0]) * math.cos(math.radians(other[1]))
+    east = ((one[0] - other[0] + 180.0) % 360.0 - 180.0) * math.cos(math.radians(other[1]))
     return 111_320.0 * math.hypot(east, one[1] - other[1])
 
 
 def _belonging(
-    elements: list[Element], aerodrome: Element | None, frame: LocalFrame, dropped: Counter[str]
+    elements: list[Element], aerodrome: Element | None, frame: LocalFrame, findings: Findings
 ) -> list[Element]:
     """Without what lies far away, and without what belongs to a neighbouring aerodrome."""
     reference = (frame.longitude, frame.latitude)
     near = [one for one in elements if all(_apart(p, reference) < FURTHEST for _, part in one.parts for p in part)]
-    dropped.update({"far away": len(elements) - len(near)} if len(near) < len(elements) else {})
+    findings.left_out.update({"far away": len(elements) - len(near)} if len(near) < len(elements) else {})
     own = area_of(aerodrome, frame) if aerodrome is not None and is_area(aerodrome) else None
     foreign = [
         area_of(one, frame) for one in near if one.aeroway == "aerodrome" and one is not aerodrome and is_area(one)
@@ -120,13 +175,13 @@ def _belonging(
     elsewhere = shapely.unary_union([one for one in foreign if one is not None]).difference(own or Polygon())
     if own is not None and not elsewhere.is_empty:
         outside = [one for one in near if elsewhere.covers(_outline(one, frame))]
-        dropped.update({"belongs to another aerodrome": len(outside)} if outside else {})
+        findings.left_out.update({"belongs to another aerodrome": len(outside)} if outside else {})
         near = [one for one in near if one not in outside]
     paved = [_outline(one, frame) for one in near if one.aeroway in PAVED and not one.status and one.type != "node"]
     ground = shapely.unary_union(paved).convex_hull.buffer(BEYOND)
     shapely.prepare(ground)
     kept = [one for one in near if ground.intersects(_outline(one, frame))]
-    dropped.update({"not near the pavement": len(near) - len(kept)} if len(kept) < len(near) else {})
+    findings.left_out.update({"not near the pavement": len(near) - len(kept)} if len(kept) < len(near) else {})
     return kept
 
 
@@ -136,17 +191,57 @@ def _outline(element: Element, frame: LocalFrame) -> BaseGeometry:
     return shapely.MultiPoint(np.column_stack([east, north]))
 
 
-def _features(elements: list[Element], frame: LocalFrame, dropped: Counter[str]) -> list[Feature]:
-    runways = make_runways(elements, frame, dropped)
+def _features(elements: list[Element], frame: LocalFrame, findings: Findings) -> list[Feature]:
+    runways = make_runways(elements, frame, findings)
+    if not runways:
+        raise ImportFault(_why_no_runway(elements, findings))
     code = max((one.code for one in runways), default=2)
-    features = make_surfaces(elements, frame, code, dropped)
+    features = make_surfaces(elements, frame, code, findings)
     features += list(_closed_runways(elements, frame))
     features += [one for runway in runways for one in _runway_features(runway)]
-    if not features:
-        raise ImportFault("nothing in the extract could be made into a map: no usable runway, taxiway or apron")
     graph = build_taxi_graph(features)
     features += make_holds(elements, runways, taxi_lanes(features, graph), features, frame)
     return _with_unique_ids(features)
+
+
+def _why_no_runway(elements: list[Element], findings: Findings) -> str:
+    closed = sum(one.aeroway == "runway" and bool(one.status) for one in elements)
+    lost = findings.left_out + Counter({"runway not in use": closed})
+    reasons = ", ".join(f"{count} x {reason}" for reason, count in sorted(lost.items()))
+    named = "".join(f"\n  {one}" for one in findings.to_check)
+    return (
+        f"no runway in the result; left out: {reasons or 'nothing'}. Is the extract complete (every way with its "
+        f'geometry: "out geom"), and is it of this airport?{named}'
+    )
+
+
+def _tell(elements: list[Element], features: list[Feature], elevation: float | None, findings: Findings) -> None:
+    """What a look at the whole shows: values of no use, ways with gaps, and what every airport has."""
+    for one in elements:
+        first, *others = aeroways_of(one.tags) or [""]
+        if first and (first not in USED or (first == "gate" and one.type == "node")):
+            findings.not_used[f"aeroway={first}"] += 1
+        for value in others:
+            findings.not_used[f"aeroway={value}, beside {first}"] += 1
+    cut = [one.id for one in elements if one.gaps and one.aeroway in PAVED]
+    if cut:
+        findings.to_check.append(
+            f"the extract lacks points of {len(cut)} runways, taxiways or aprons (cut off at the edge of its box?): "
+            + ", ".join(cut[:10])
+            + (" and others" if len(cut) > 10 else "")
+        )
+    kinds = {one.kind for one in features}
+    if "TaxiwayGuidanceLine" not in kinds:
+        findings.to_check.append(
+            "there is no taxiway: tracks cannot be expected along them, no position can be derived"
+        )
+    if "TaxiwayHoldingPosition" not in kinds:
+        findings.to_check.append("there is no holding position, neither mapped nor derived")
+    if elevation is None:
+        findings.to_check.append(
+            "the elevation of the airport is not known: without --elevation METRES no altitude of anything in the air "
+            "is given to others"
+        )
 
 
 def _runway_features(runway: RunwayDraft) -> Iterator[Feature]:
@@ -212,7 +307,7 @@ def _with_unique_ids(features: list[Feature]) -> list[Feature]:
     return made
 
 
-def _summary(features: list[Feature], dropped: Counter[str]) -> dict[str, Any]:
+def _summary(features: list[Feature], findings: Findings) -> dict[str, Any]:
     derived: Counter[str] = Counter()
     for one in features:
         if one.properties.get("derived"):
@@ -224,7 +319,9 @@ def _summary(features: list[Feature], dropped: Counter[str]) -> dict[str, Any]:
     return {
         "counts": dict(sorted(counts.items())),
         "derived": dict(sorted(derived.items())),
-        "left_out": dict(sorted(dropped.items())),
+        "left_out": dict(sorted(findings.left_out.items())),
+        "not_used": dict(sorted(findings.not_used.items())),
+        "to_check": findings.to_check,
     }
 
 

@@ -6,8 +6,6 @@ Code numbers, default widths and distances: ICAO Annex 14 Volume I, tables 1-1, 
 from __future__ import annotations
 
 import math
-import re
-from collections import Counter
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -16,7 +14,16 @@ import shapely
 from shapely.geometry import LineString, MultiPolygon, Point, Polygon
 
 from pipeline.airport.frame import LocalFrame
-from pipeline.airport.osm.elements import Element, area_of, is_area, lines_of, metres, point_of
+from pipeline.airport.osm.designators import (
+    are_opposite,
+    misfit,
+    opposite_designator,
+    read_designators,
+    runway_id,
+    sorted_ends,
+)
+from pipeline.airport.osm.elements import Element, Findings, point_of
+from pipeline.airport.osm.runway_parts import RunwayPart, lose, published_designators, runway_parts
 
 HOLD_DISTANCE = {4: 90.0, 3: 75.0, 2: 40.0, 1: 40.0}
 """Metres from the centreline to a holding position, by runway code number."""
@@ -27,8 +34,15 @@ DEFAULT_WIDTH = {4: 45.0, 3: 30.0, 2: 23.0, 1: 18.0}
 SHORTEST = 250.0
 JOIN_TOUCHING = 8.0
 JOIN_SAME_NAME = 300.0
-OVERRUNS = ("stopway", "blast_pad", "blastpad", "overrun", "clearway")
-_DESIGNATOR = re.compile(r"^0?(\d{1,2})([LRC]?)$")
+UNNAMED_SHORTEST = 600.0
+"""Metres. A strip without designators that is shorter, and shorter than UNNAMED_SHARE of the longest runway that has
+some, is a landing area for helicopters, models or parachutists: Annex 14 wants designators on every runway."""
+UNNAMED_SHARE = 0.25
+UNLIKELY = 25.0
+"""Degrees between direction and designators beyond which somebody has to look: half of the 5 degrees of rounding more
+than the magnetic variation where most airports are."""
+IMPOSSIBLE = 80.0
+"""Degrees beyond which it cannot be told which end a designator means."""
 
 
 def runway_code(length: float) -> int:
@@ -40,7 +54,8 @@ def runway_code(length: float) -> int:
 class RunwayDraft:
     """A runway being made. start, end: of the pavement, in the direction of designators[0].
 
-    displaced: metres from either pavement end to its threshold. derived: what the map did not say.
+    displaced: metres from either pavement end to its threshold. derived: what the map did not say. reference: the
+    "ref" as it was written.
     """
 
     start: Point
@@ -55,6 +70,7 @@ class RunwayDraft:
     derived: set[str] = field(default_factory=set)
     id: str = ""
     name: str = ""
+    reference: str = ""
 
     @property
     def length(self) -> float:
@@ -87,112 +103,31 @@ class RunwayDraft:
         return Polygon(self.centreline.buffer(self.width / 2, cap_style="flat"))
 
 
-@dataclass
-class _Piece:
-    line: LineString
-    element: Element
-    role: str
-    designators: tuple[str, str] | None
-
-    @property
-    def width(self) -> float | None:
-        return metres(self.element.tags.get("width"), 5.0, 150.0)
-
-
-def read_designators(text: str) -> tuple[str, str] | None:
-    """("06", "24") from "06/24", "6-24", "24"; None when it is not a runway's name."""
-    parts = [one for one in re.split(r"[/\-;,\s]+", text.strip().upper().removeprefix("RWY")) if one]
-    found: list[str] = []
-    for part in parts[:2]:
-        match = _DESIGNATOR.match(part)
-        if not match or not 1 <= int(match[1]) <= 36:
-            return None
-        found.append(f"{int(match[1]):02d}{match[2]}")
-    if not found:
-        return None
-    if len(found) == 1:
-        found.append(opposite_designator(found[0]))
-    return found[0], found[1]
-
-
-def opposite_designator(designator: str) -> str:
-    """The other end's name: "06L" gives "24R"."""
-    number = (int(designator[:2]) + 17) % 36 + 1
-    return f"{number:02d}{designator[2:].translate(str.maketrans('LR', 'RL'))}"
-
-
-def runway_id(designators: tuple[str, str]) -> str:
-    """Both designators, the lower first."""
-    return "/".join(sorted(designators))
-
-
-def make_runways(elements: list[Element], frame: LocalFrame, dropped: Counter[str]) -> list[RunwayDraft]:
+def make_runways(elements: list[Element], frame: LocalFrame, findings: Findings) -> list[RunwayDraft]:
     """All runways in use, the longest first."""
-    pieces, areas = _collect(elements, frame, dropped)
+    pieces, areas = runway_parts(elements, frame, findings)
     drafts = [_draft(group) for group in _groups([one for one in pieces if one.role == "runway"])]
-    drafts += _from_areas(areas, drafts, dropped)
+    drafts += _from_areas(areas, drafts, findings)
+    named = [one.length for one in drafts if one.designators[0]]
+    unnamed_shortest = min(UNNAMED_SHORTEST, UNNAMED_SHARE * max(named, default=0.0))
     kept: list[RunwayDraft] = []
     for draft in sorted(drafts, key=lambda one: -one.length):
         if draft.length < SHORTEST:
-            dropped["runway too short"] += 1
+            lose(findings, draft.reference, draft.source, "runway too short")
+        elif not draft.designators[0] and draft.length < unnamed_shortest:
+            lose(findings, draft.reference, draft.source, "short strip without designators")
         elif any(_same_place(draft, other) for other in kept):
-            dropped["runway drawn twice"] += 1
+            lose(findings, draft.reference, draft.source, "runway drawn twice")
         else:
             kept.append(draft)
-    made = _named(kept)
+    made = _named(kept, frame, findings)
     for piece in pieces:
         if piece.role != "runway" and not _attach(piece, made):
-            dropped["part of no runway"] += 1
+            lose(findings, piece.element.name, [piece.element.id], "part of no runway")
     for element in elements:
         if element.type == "node" and element.aeroway in ("threshold", "displaced_threshold"):
             _move_threshold(point_of(element, frame), read_designators(element.name), made)
     return made
-
-
-def _collect(
-    elements: list[Element], frame: LocalFrame, dropped: Counter[str]
-) -> tuple[list[_Piece], list[tuple[Element, Polygon | MultiPolygon]]]:
-    pieces: list[_Piece] = []
-    areas: list[tuple[Element, Polygon | MultiPolygon]] = []
-    for element in elements:
-        role = _role(element)
-        if not role or element.status or element.type == "node":
-            continue
-        if _for_helicopters_or_models(element):
-            dropped["runway for helicopters or models"] += 1
-        elif is_area(element) and role == "runway":
-            area = area_of(element, frame)
-            if area is None:
-                dropped["area does not close"] += 1
-            else:
-                areas.append((element, area))
-        elif role == "other":
-            dropped["part of no runway"] += 1
-        else:
-            for line in lines_of(element, frame):
-                if role == "runway" and line.length > 1.08 * Point(line.coords[0]).distance(Point(line.coords[-1])):
-                    dropped["runway not straight"] += 1
-                    continue
-                pieces.append(_Piece(line, element, role, read_designators(element.tags.get("ref", ""))))
-    return pieces, areas
-
-
-def _role(element: Element) -> str:
-    if element.aeroway in OVERRUNS:
-        return "stopway"
-    if element.aeroway != "runway":
-        return ""
-    kind = element.tags.get("runway", "")
-    if kind in OVERRUNS:
-        return "stopway"
-    return "displaced" if kind.startswith("displaced") else "other" if kind.startswith("turn") else "runway"
-
-
-def _for_helicopters_or_models(element: Element) -> bool:
-    words = " ".join(element.tags.get(key, "") for key in ("name", "description", "note", "runway", "sport", "usage"))
-    if re.search(r"\bfato\b|helicop|heli\b|model|ultralight only", words, re.IGNORECASE):
-        return True
-    return bool(re.match(r"^(H\d|\d{1,2}H\b)", element.tags.get("ref", "").upper()))
 
 
 def _axis(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -213,8 +148,8 @@ def _collinear(one: LineString, other: LineString) -> bool:
     return bool(across.max() < 12.0) and (turn < 0.06 or short.length < 100.0)
 
 
-def _groups(pieces: list[_Piece]) -> list[list[_Piece]]:
-    groups: list[list[_Piece]] = [[one] for one in pieces]
+def _groups(pieces: list[RunwayPart]) -> list[list[RunwayPart]]:
+    groups: list[list[RunwayPart]] = [[one] for one in pieces]
     joined = True
     while joined:
         joined = False
@@ -229,7 +164,7 @@ def _groups(pieces: list[_Piece]) -> list[list[_Piece]]:
     return groups
 
 
-def _belong(one: _Piece, other: _Piece) -> bool:
+def _belong(one: RunwayPart, other: RunwayPart) -> bool:
     both = one.designators is not None and other.designators is not None
     if both and runway_id(one.designators or ("", "")) != runway_id(other.designators or ("", "")):
         return False
@@ -237,7 +172,7 @@ def _belong(one: _Piece, other: _Piece) -> bool:
     return gap <= (JOIN_SAME_NAME if both else JOIN_TOUCHING) and _collinear(one.line, other.line)
 
 
-def _draft(group: list[_Piece]) -> RunwayDraft:
+def _draft(group: list[RunwayPart]) -> RunwayDraft:
     points = np.vstack([np.asarray(one.line.coords) for one in group])
     centre, axis = _axis(points)
     along = (points - centre) @ axis
@@ -253,6 +188,7 @@ def _draft(group: list[_Piece]) -> RunwayDraft:
         sorted({one.element.id for one in group}),
         surface=longest.element.tags.get("surface", ""),
         name=longest.element.tags.get("name", ""),
+        reference=(known or longest).element.name,
     )
     if not widths:
         draft.derived.add("width")
@@ -260,7 +196,7 @@ def _draft(group: list[_Piece]) -> RunwayDraft:
 
 
 def _from_areas(
-    areas: list[tuple[Element, Polygon | MultiPolygon]], drafts: list[RunwayDraft], dropped: Counter[str]
+    areas: list[tuple[Element, Polygon | MultiPolygon]], drafts: list[RunwayDraft], findings: Findings
 ) -> list[RunwayDraft]:
     made: list[RunwayDraft] = []
     for element, area in areas:
@@ -268,19 +204,22 @@ def _from_areas(
         if owner is not None:
             if isinstance(area, Polygon) and area.area < 4 * owner.length * owner.width:
                 owner.area = area
+            if not owner.designators[0]:
+                owner.designators = published_designators(element) or owner.designators
             continue
         box = shapely.get_coordinates(area.minimum_rotated_rectangle)[:4]
         sides = [float(np.hypot(*(b - a))) for a, b in pairwise([*box, box[0]])]
         if max(sides) < 4 * min(sides):
-            dropped["runway area without direction"] += 1
+            lose(findings, element.name, [element.id], "runway area without direction")
             continue
         turn = 0 if sides[0] < sides[1] else 1
         box = np.roll(box, -turn, axis=0)
         middles = (box[0] + box[1]) / 2, (box[2] + box[3]) / 2
-        designators = read_designators(element.tags.get("ref", "")) or ("", "")
+        designators = published_designators(element) or ("", "")
         draft = RunwayDraft(Point(*middles[0]), Point(*middles[1]), min(sides), designators, [element.id])
         draft.surface = element.tags.get("surface", "")
         draft.area = area if isinstance(area, Polygon) else None
+        draft.name, draft.reference = element.tags.get("name", ""), element.name
         made.append(draft)
     return made
 
@@ -289,8 +228,8 @@ def _same_place(one: RunwayDraft, other: RunwayDraft) -> bool:
     return bool(one.strip().intersection(other.strip()).area > 0.6 * one.strip().area)
 
 
-def _named(drafts: list[RunwayDraft]) -> list[RunwayDraft]:
-    made = [_turned(one) for one in drafts]
+def _named(drafts: list[RunwayDraft], frame: LocalFrame, findings: Findings) -> list[RunwayDraft]:
+    made = [_turned(one, frame, findings) for one in drafts]
     by_name: dict[str, list[RunwayDraft]] = {}
     for draft in made:
         if "designators" in draft.derived:
@@ -305,29 +244,39 @@ def _named(drafts: list[RunwayDraft]) -> list[RunwayDraft]:
         while draft.id in taken:
             draft.id = f"{base}-{again}"
             again += 1
+        if draft.id != base:
+            told = f"another runway is called {base} too: this one ({', '.join(draft.source)}) is {draft.id} here"
+            findings.to_check.append(told)
         taken.add(draft.id)
     return made
 
 
-def _turned(draft: RunwayDraft) -> RunwayDraft:
-    """Designators checked against the direction; the lower designator's direction becomes the runway's."""
-    given = draft.designators
-    derived = set(draft.derived)
-    if not given[0] or given[1] != opposite_designator(given[0]) or _misfit(draft.heading, given[0], either=True) > 40:
-        number = round(math.degrees(draft.heading) / 10 - 1) % 36 + 1
-        given = f"{number:02d}", opposite_designator(f"{number:02d}")
+def _turned(draft: RunwayDraft, frame: LocalFrame, findings: Findings) -> RunwayDraft:
+    """Published designators stand, whatever the variation; the lower one's direction becomes the runway's."""
+
+    def off(designator: str, turn: float = 0.0) -> float:
+        return misfit(draft.heading + turn, designator, frame.latitude, frame.longitude)
+
+    given, derived = draft.designators, set(draft.derived)
+    where = f"{draft.reference or 'unnamed'} ({', '.join(draft.source)})"
+    turned = min(off(given[0]), off(given[0], math.pi)) if given[0] else 0.0
+    if not given[0] or not are_opposite(given) or turned > IMPOSSIBLE:
+        number = f"{round(math.degrees(draft.heading) / 10 - 1) % 36 + 1:02d}"
+        made = sorted_ends((number, opposite_designator(number)))
+        why = "no published designators that can be read" if not given[0] else "designators that cannot be its own"
+        findings.to_check.append(f"runway {where} has {why}: called {'/'.join(made)} by its direction")
+        given = made
         derived.add("designators")
-    low, high = sorted(given)
+    elif turned > UNLIKELY:
+        findings.to_check.append(
+            f"runway {where} lies {turned:.0f} degrees off its designators (magnetic variation?): they are kept"
+        )
+    low, high = sorted_ends(given)
     start, end = draft.start, draft.end
-    if _misfit(draft.heading, low, either=False) > 90:
+    away = misfit(draft.heading, low, 0.0, 0.0) if "designators" in derived else off(low)
+    if away > 90:
         start, end = end, start
     return replace(draft, designators=(low, high), start=start, end=end, derived=derived)
-
-
-def _misfit(heading: float, designator: str, *, either: bool) -> float:
-    turn = 180 if either else 360
-    difference = (math.degrees(heading) - 10 * int(designator[:2])) % turn
-    return min(difference, turn - difference)
 
 
 def _set_sides(same: list[RunwayDraft]) -> None:
@@ -341,7 +290,7 @@ def _set_sides(same: list[RunwayDraft]) -> None:
         draft.designators = low, opposite_designator(low)
 
 
-def _attach(piece: _Piece, runways: list[RunwayDraft]) -> bool:
+def _attach(piece: RunwayPart, runways: list[RunwayDraft]) -> bool:
     near = [one for one in runways if _collinear(piece.line, one.centreline)]
     near = [one for one in near if piece.line.distance(one.centreline) < 60.0]
     if not near:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
@@ -13,7 +12,7 @@ from shapely.geometry import LineString, Point, Polygon
 
 from pipeline.airport.frame import LocalFrame
 from pipeline.airport.model import Feature
-from pipeline.airport.osm.elements import Element, area_of, is_area, lines_of, metres, point_of
+from pipeline.airport.osm.elements import Element, Findings, area_of, is_area, lines_of, metres, point_of
 
 TAXIWAY_WIDTH = {4: 23.0, 3: 15.0, 2: 10.5, 1: 7.5}
 """Default width by the airport's greatest runway code number (ICAO Annex 14, 3.9.5)."""
@@ -31,7 +30,7 @@ STAND_LENGTH = 45.0
 BUILDING_AEROWAYS = ("terminal", "hangar", "tower", "control_tower", "control_center", "shelter")
 
 
-def make_surfaces(elements: list[Element], frame: LocalFrame, code: int, dropped: Counter[str]) -> list[Feature]:
+def make_surfaces(elements: list[Element], frame: LocalFrame, code: int, findings: Findings) -> list[Feature]:
     """Features of everything but runways and holding positions, in drawing order. code: greatest runway code."""
     made: dict[str, list[Feature]] = {"apron": [], "taxiway": [], "stand": [], "building": [], "road": [], "water": []}
     for element in elements:
@@ -39,13 +38,13 @@ def make_surfaces(elements: list[Element], frame: LocalFrame, code: int, dropped
         if not group:
             continue
         if element.status == "planned" or (element.status and group != "taxiway"):
-            dropped["not in use"] += 1
+            findings.left_out["not in use"] += 1
             continue
         features = list(_features(group, element, frame, code))
         if not features:
-            dropped["no usable shape"] += 1
+            findings.left_out["no usable shape"] += 1
         made[group].extend(features)
-    made["building"] = _without_repeats(made["building"], dropped)
+    made["building"] = _without_repeats(made["building"], findings)
     made["stand"].extend(_stand_ends(made["stand"], made["taxiway"]))
     made["stand"].extend(_stand_areas(made["stand"]))
     return [one for group in ("water", "apron", "road", "building", "stand", "taxiway") for one in made[group]]
@@ -169,7 +168,7 @@ def _road(element: Element, frame: LocalFrame) -> Iterator[Feature]:
         yield Feature(id, "ServiceRoad", element.name, line, properties)
 
 
-def _without_repeats(buildings: list[Feature], dropped: Counter[str]) -> list[Feature]:
+def _without_repeats(buildings: list[Feature], findings: Findings) -> list[Feature]:
     """Without the buildings that are drawn twice (a way and a relation of the same outline)."""
     areas = [one.geometry for one in buildings]
     tree = shapely.STRtree(areas) if areas else None
@@ -182,7 +181,7 @@ def _without_repeats(buildings: list[Feature], dropped: Counter[str]) -> list[Fe
                 common = area.intersection(areas[other]).area
                 if common > 0.9 * max(area.area, areas[other].area):
                     gone.add(int(other))
-    dropped.update({"building drawn twice": len(gone)} if gone else {})
+    findings.left_out.update({"building drawn twice": len(gone)} if gone else {})
     return [one for place, one in enumerate(buildings) if place not in gone]
 
 
