@@ -85,8 +85,8 @@ def _area(
     box = axis.buffer(distance, cap_style="flat")
     ways = [_box(one, -200.0, 0.0) for one in holds if runway.strip.distance(one.position) < distance]
     ways.append(_outside(lanes, walk, box).buffer(CLEARANCE, cap_style="flat"))
-    in_front = [_way_in(lanes, walk, point) for point in walk.held]
-    area = shapely.unary_union([box, *in_front]).difference(shapely.unary_union(ways)).union(runway.strip)
+    in_front = shapely.unary_union([_way_in(lanes, walk, point) for point in walk.held])
+    area = box.difference(shapely.unary_union(ways)).union(in_front).union(runway.strip)
     pieces = [one for one in shapely.get_parts(area) if isinstance(one, Polygon)]
     whole = max(pieces, key=lambda one: one.intersection(runway.strip).area)
     return Polygon(shapely.get_coordinates(Polygon(whole.exterior).simplify(0.5)))

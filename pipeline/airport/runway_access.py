@@ -17,7 +17,10 @@ from shapely.geometry import LineString, Polygon
 from pipeline.airport.model import Feature, TaxiGraph
 
 STEP = 4.0
-PARALLEL = math.radians(15.0)
+PARALLEL = math.radians(5.0)
+"""Between a runway and a lane alongside: one that draws away faster is a way out, such as a rapid exit."""
+ROOM = 100.0
+"""Metres beyond the distance that a walk goes on to get clear of another runway."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +62,8 @@ class Lanes:
 class Access:
     """What was walked from one runway. inside: (points,) within the holding positions or the distance.
 
-    before: the point nearer to the runway on the way there. crossings: where the walk left the distance, as
-    (point, reason). held: blocked points met.
+    before: the point nearer to the runway on the way there. crossings: where the walk ended, as (point, reason):
+    "distance", "alongside", and with `keep_clear` "no room" and "another runway". held: blocked points met.
     """
 
     inside: NDArray[np.bool_]
@@ -109,11 +112,13 @@ def walk_outward(
     distance: float,
     blocked: Sequence[int] | set[int],
     width: float = 45.0,
+    keep_clear: NDArray[np.bool_] | None = None,
 ) -> Access:
     """Walk from the pavement of a runway until a blocked point, another runway, a lane alongside, or the distance.
 
     A lane that runs alongside the runway within the distance (at small aerodromes) is outside: traffic on it is not
-    about to enter. Dijkstra, so `before` leads back the shortest way.
+    about to enter. keep_clear: (points,) where the walk does not end though it has left the distance, because nobody
+    may wait there; after ROOM metres more it gives up. Dijkstra, so `before` leads back the shortest way.
     """
     east, north = lanes.points.T
     access = Access(np.zeros(len(lanes.points), np.bool_))
@@ -127,6 +132,9 @@ def walk_outward(
     at_other &= ~at_runway
     along = np.asarray(centreline.coords[-1]) - np.asarray(centreline.coords[0])
     along = along / np.hypot(*along)
+    forward = (lanes.points - np.asarray(centreline.coords[0])) @ along
+    abeam = (forward >= 0.0) & (forward <= centreline.length)  # a lane off the end of a runway leads to it
+    kept_clear = np.zeros(len(east), np.bool_) if keep_clear is None else keep_clear
     stop = set(blocked)
     queue = [(0.0, int(point), -1) for point in np.flatnonzero(at_runway)]
     while queue:
@@ -141,11 +149,13 @@ def walk_outward(
             access.inside[point] = True
             continue
         if at_other[point]:
+            if keep_clear is not None:
+                access.crossings.append((point, "another runway"))
             continue
-        if away[point] > distance:
-            access.crossings.append((point, "distance"))
+        if away[point] > distance and (not kept_clear[point] or away[point] > distance + ROOM):
+            access.crossings.append((point, "no room" if kept_clear[point] else "distance"))
             continue
-        if away[point] > width / 2 + 20.0 and _alongside(lanes, access, point, along):
+        if abeam[point] and width / 2 + 20.0 < away[point] <= distance and _alongside(lanes, access, point, along):
             access.crossings.append((point, "alongside"))
             continue
         access.inside[point] = True

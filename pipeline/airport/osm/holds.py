@@ -5,26 +5,33 @@ Distances: ICAO Annex 14 Volume I, table 3-2 (by runway code number, see runways
 
 from __future__ import annotations
 
+import heapq
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.geometry import LineString, Point
 
 from pipeline.airport.frame import LocalFrame
 from pipeline.airport.model import Feature
 from pipeline.airport.osm.designators import numbers_and_sides, read_designators, runway_id, sorted_ends
-from pipeline.airport.osm.elements import Element, point_of, values_of
+from pipeline.airport.osm.elements import Element, Findings, point_of, values_of
 from pipeline.airport.osm.runways import HOLD_DISTANCE, LOW_VISIBILITY_DISTANCE, RunwayDraft
-from pipeline.airport.runway_access import Access, Lanes, walk_outward
+from pipeline.airport.runway_access import STEP, Access, Lanes, walk_outward
 
 REACH = 700.0
 """Metres of taxiway within which a position that is said to guard a runway must reach it."""
 UNTYPED_REACH = 260.0
-FURTHER_OUT = 300.0
+FURTHER_OUT = REACH
+"""Metres of taxiway within which a mapped position further out spares a derived one."""
+SNAP = 40.0
+"""Metres from the line of a taxiway within which a position is on it: some are drawn at its edge or on its shoulder."""
+CROSSING_TO_RUNWAY = 12.0
+"""Metres of taxiway over which the direction towards the runway is taken."""
 PASSED = 300.0
 LOW_VISIBILITY = ("ils", "cat", "critical")
 
@@ -42,6 +49,8 @@ class _Hold:
     heading: float = 0.0
     width: float = 23.0
     derived: bool = False
+    guessed: bool = False
+    """Is it taken for a low-visibility position only because it is far out?"""
 
 
 def make_holds(
@@ -50,17 +59,31 @@ def make_holds(
     lanes: Lanes,
     features: Sequence[Feature],
     frame: LocalFrame,
+    findings: Findings,
 ) -> list[Feature]:
-    """TaxiwayHoldingPosition features, mapped ones first, then the derived ones; and the intermediate positions."""
+    """TaxiwayHoldingPosition features, mapped ones first, then the derived ones; and the intermediate positions.
+
+    Where a derived one had to be nearer to its runway than it should, or found no room, `findings` says so.
+    """
     found = [_read(one, runways, lanes, features, frame) for one in elements if one.aeroway == "holding_position"]
     guarded = {one.lane for one in found if one.kind == "CAT_I" and one.lane is not None}
     free = [_walk(one, runways, lanes, set()) for one in runways]
     held = [_walk(one, runways, lanes, guarded) for one in runways]
     for hold in found:
         _assign(hold, runways, lanes, free, held)
+    for hold in found:
+        if hold.guessed and not _behind_another(hold, found, free):
+            hold.kind = "CAT_I"
     kept = _without_repeats(found)
-    derived = [one for number in range(len(runways)) for one in _derive(number, runways, kept, lanes, features)]
-    kept += _without_repeats(derived)
+    if len(kept) < len(found):
+        findings.left_out["holding position drawn twice"] += len(found) - len(kept)
+    derived = [
+        one for number in range(len(runways)) for one in _derive(number, runways, kept, lanes, features, findings)
+    ]
+    derived = _without_repeats(derived)
+    for hold in derived:
+        _say_too_near(findings, runways[hold.runway], hold)
+    kept += derived
     return [_feature(one, runways) for one in kept]
 
 
@@ -78,9 +101,12 @@ def _read(
         kind = "land_and_hold_short" if told == "lahso" else "intermediate"
     wanted, name = _runway_in(element.tags.get("ref", ""), runways)
     hold = _Hold(element.id, name, point, kind, wanted, element.id)
-    hold.lane = lanes.nearest((point.x, point.y), 20.0)
+    hold.lane = lanes.nearest((point.x, point.y), SNAP)
     if hold.lane is not None:
         _take_taxiway(hold, lanes, features)
+        on_lane = Point(lanes.points[hold.lane])
+        if point.distance(on_lane) > hold.width / 2 + STEP:  # its bar would cross no traffic
+            hold.point = on_lane
     return hold
 
 
@@ -133,8 +159,17 @@ def _assign(
     runway = runways[hold.runway]
     if hold.kind == "untyped":
         far = 1.25 * HOLD_DISTANCE[runway.code]
-        hold.kind = "CAT_I" if runway.centreline.distance(hold.point) < max(far, 120.0) else "CAT_II_III"
+        hold.guessed = runway.centreline.distance(hold.point) >= max(far, 120.0)
+        hold.kind = "CAT_II_III" if hold.guessed else "CAT_I"
     _turn_along(hold, lanes, runway, ways[hold.runway][1])
+
+
+def _behind_another(hold: _Hold, found: Sequence[_Hold], free: Sequence[Access]) -> bool:
+    """Does the way in pass a nearer position of the same runway?"""
+    if hold.lane is None:
+        return True
+    nearer = {one.lane for one in found if one.runway == hold.runway and one.kind == "CAT_I"}
+    return bool(nearer & set(free[hold.runway].trace(hold.lane, math.inf)[1:]))
 
 
 def _way(runway: RunwayDraft, hold: _Hold, free: Access, held: Access) -> tuple[float, Access]:
@@ -187,32 +222,80 @@ def _without_repeats(holds: list[_Hold]) -> list[_Hold]:
 
 
 def _derive(
-    number: int, runways: Sequence[RunwayDraft], known: list[_Hold], lanes: Lanes, features: Sequence[Feature]
+    number: int,
+    runways: Sequence[RunwayDraft],
+    known: list[_Hold],
+    lanes: Lanes,
+    features: Sequence[Feature],
+    findings: Findings,
 ) -> Iterator[_Hold]:
+    """Positions on the ways to a runway that pass no mapped one: at its distance, and clear of the other runways."""
     runway = runways[number]
     mine = [one for one in known if one.runway == number and one.kind == "CAT_I"]
     blocked = {one for hold in mine for one in lanes.crossing(_bar(hold))}
     blocked |= {hold.lane for hold in mine if hold.lane is not None}
-    others = [one.strip() for one in runways if one is not runway]
+    facing = {hold.lane: hold.heading for hold in known if hold.runway not in (-1, number) and hold.kind == "CAT_I"}
+    others = [one for one in runways if one is not runway]
     distance = HOLD_DISTANCE[runway.code]
-    walk = walk_outward(lanes, runway.strip(), runway.centreline, others, distance, blocked, runway.width)
-    for point, _ in walk.crossings:
-        east, north = (float(one) for one in lanes.points[point])
-        trail = walk.trace(point, 12.0)
+    near = _near(others, lanes)
+    walk = walk_outward(
+        lanes, runway.strip(), runway.centreline, [one.strip() for one in others], distance, blocked, runway.width, near
+    )
+    ends = {point for point, reason in walk.crossings if reason in ("distance", "alongside")}
+    for point, reason in walk.crossings:
+        name = _taxiway_name(point, lanes, features)
+        if near[point] or reason not in ("distance", "alongside"):
+            _say_no_room(findings, runway, name)
+            continue
+        trail = walk.trace(point, CROSSING_TO_RUNWAY)
         inward = lanes.points[trail[-1]] - lanes.points[point]
+        east, north = (float(one) for one in lanes.points[point])
         length = float(np.hypot(*inward))
         if length == 0 or any(_guards(one, east, north, inward / length) for one in mine):
             continue
-        if _held_further_out(lanes, point, trail[-1], blocked):
+        if ends & set(walk.trace(point, math.inf)[1:]):  # who passes here meets the other one further in
             continue
-        owner = int(lanes.owner[point])
-        name = features[owner].name if owner >= 0 else ""
-        source = str(features[owner].properties.get("source", "")) if owner >= 0 else ""
+        if _held_further_out(lanes, point, trail[-1], blocked, facing, runway, others):
+            continue
         id = f"hold/{runway.id.replace('/', '-')}/{round(east)}/{round(north)}"
+        owner = int(lanes.owner[point])
+        source = str(features[owner].properties.get("source", "")) if owner >= 0 else ""
         hold = _Hold(id, name, Point(east, north), "CAT_I", runway.id, source, point, number, derived=True)
         _take_taxiway(hold, lanes, features)
         _turn_along(hold, lanes, runway, walk)
         yield hold
+
+
+def _near(runways: Sequence[RunwayDraft], lanes: Lanes) -> NDArray[np.bool_]:
+    """(points,) where who waits is in the way of one of these runways."""
+    points = shapely.points(lanes.points)
+    made = np.zeros(len(lanes.points), np.bool_)
+    for one in runways:
+        made |= np.asarray(shapely.distance(points, one.centreline)) <= HOLD_DISTANCE[one.code]
+    return made
+
+
+def _taxiway_name(point: int, lanes: Lanes, features: Sequence[Feature]) -> str:
+    owner = int(lanes.owner[point])
+    return features[owner].name if owner >= 0 else ""
+
+
+def _say_no_room(findings: Findings, runway: RunwayDraft, taxiway: str) -> None:
+    told = (
+        f"no holding position of runway {runway.id} is derived on taxiway {taxiway or '(unnamed)'}: there is no room "
+        "between it and another runway"
+    )
+    if told not in findings.to_check:
+        findings.to_check.append(told)
+
+
+def _say_too_near(findings: Findings, runway: RunwayDraft, hold: _Hold) -> None:
+    away, distance = float(runway.centreline.distance(hold.point)), HOLD_DISTANCE[runway.code]
+    if away < distance:
+        findings.to_check.append(
+            f"the holding position derived on taxiway {hold.name or '(unnamed)'} is {away:.0f} m from the centreline "
+            f"of runway {runway.id}, nearer than the {distance:.0f} m of its code number: a taxiway runs alongside"
+        )
 
 
 def _guards(hold: _Hold, east: float, north: float, inward: np.ndarray) -> bool:
@@ -222,22 +305,44 @@ def _guards(hold: _Hold, east: float, north: float, inward: np.ndarray) -> bool:
     return length < 12.0 or (length < 70.0 and float(-outward @ inward) > 0.8 * length)
 
 
-def _held_further_out(lanes: Lanes, point: int, inner: int, holds: set[int]) -> bool:
-    """Does every way further out meet a mapped position (as on rapid exits, and where two taxiways join)?"""
+def _held_further_out(
+    lanes: Lanes,
+    point: int,
+    inner: int,
+    holds: set[int],
+    facing: Mapping[int | None, float],
+    runway: RunwayDraft,
+    others: Sequence[RunwayDraft],
+) -> bool:
+    """Does every way further out meet a mapped position (as on rapid exits, and where two taxiways join)?
+
+    holds: points of the positions of this runway. facing: the headings of those of others, which count where who
+    comes this way passes them towards their runway (as where one guards two runways that meet). A way that leads back
+    to the runway itself is no way in; one from another runway is.
+    """
+    strip, elsewhere = runway.strip(), shapely.unary_union([one.strip() for one in others])
+    shapely.prepare([strip, elsewhere])
     away = lanes.points[point] - lanes.points[inner]
-    seen = {inner, point}
-    ends = [(point, 0.0)]
-    while ends:
-        here, walked = ends.pop()
-        if here in holds:
+    seen = {inner}
+    queue = [(0.0, point, inner)]
+    while queue:
+        walked, here, before = heapq.heappop(queue)
+        if here in holds or here in seen:
             continue
-        ahead = [(one, step) for one, step in lanes.neighbours[here] if one not in seen]
+        seen.add(here)
+        east, north = lanes.points[before] - lanes.points[here]
+        if here in facing and east * math.sin(facing[here]) + north * math.cos(facing[here]) > 0.0:
+            continue
+        ahead = lanes.neighbours[here]
         if here == point:  # the points passed on the way here lie behind
             ahead = [one for one in ahead if float((lanes.points[one[0]] - lanes.points[point]) @ away) > 0]
-        if not ahead or walked > FURTHER_OUT:
+        elif shapely.contains_xy(strip, *lanes.points[here]):
+            continue
+        dead_end = len(ahead) < (1 if here == point else 2)
+        if dead_end or walked > FURTHER_OUT or shapely.contains_xy(elsewhere, *lanes.points[here]):
             return False
-        seen.update(one for one, _ in ahead)
-        ends.extend((one, walked + step) for one, step in ahead)
+        for one, step in ahead:
+            heapq.heappush(queue, (walked + step, one, here))
     return True
 
 

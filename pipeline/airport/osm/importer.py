@@ -200,7 +200,7 @@ def _features(elements: list[Element], frame: LocalFrame, findings: Findings) ->
     features += list(_closed_runways(elements, frame))
     features += [one for runway in runways for one in _runway_features(runway)]
     graph = build_taxi_graph(features)
-    features += make_holds(elements, runways, taxi_lanes(features, graph), features, frame)
+    features += make_holds(elements, runways, taxi_lanes(features, graph), features, frame, findings)
     return _with_unique_ids(features)
 
 
