@@ -40,6 +40,7 @@ def airport_from_geojson(
     if not isinstance(raw, list) or not raw:
         raise AirportFault('the map has no "features"')
     frame = _frame(document)
+    _check_elevation(document.get("elevation_m"))
     features = tuple(_feature(one, place, frame) for place, one in enumerate(raw))
     repeated = _repeated([one.id for one in features])
     if repeated:
@@ -69,6 +70,13 @@ def _frame(document: dict[str, Any]) -> LocalFrame:
     if not (-90 <= latitude <= 90 and -180 <= longitude <= 180):
         raise AirportFault(f"the reference point ({latitude}, {longitude}) is not on the earth")
     return LocalFrame(latitude, longitude)
+
+
+def _check_elevation(value: Any) -> None:
+    if value is None:
+        return
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise AirportFault(f'"elevation_m" must be metres above mean sea level, not {value!r}')
 
 
 def _feature(raw: Any, place: int, frame: LocalFrame) -> Feature:

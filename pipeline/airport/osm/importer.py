@@ -83,7 +83,7 @@ def airport_geojson(
     frame = _frame(read)
     elements = _belonging(read, aerodrome, frame, findings)
     features = _features(elements, frame, findings)
-    height = elevation if elevation is not None else _elevation(aerodrome, elements)
+    height = elevation if elevation is not None else _elevation(aerodrome, elements, findings)
     _tell(elements, features, height, findings)
     made: dict[str, Any] = {
         "type": "FeatureCollection",
@@ -114,13 +114,18 @@ def _in_one_piece(elements: list[Element]) -> list[Element]:
     return [replace(one, parts=tuple((role, moved(part)) for role, part in one.parts)) for one in elements]
 
 
-def _elevation(aerodrome: Element | None, elements: list[Element]) -> float | None:
+def _elevation(aerodrome: Element | None, elements: list[Element], findings: Findings) -> float | None:
     """Of the aerodrome, or the highest of its runways: it is the elevation of the highest point of the landing area."""
     told = elevation_of(aerodrome.tags.get("ele")) if aerodrome is not None else None
     if told is not None:
         return told
     heights = [elevation_of(one.tags.get("ele")) for one in elements if one.aeroway == "runway" and not one.status]
-    return max((one for one in heights if one is not None), default=None)
+    highest = max((one for one in heights if one is not None), default=None)
+    if highest is not None:
+        findings.to_check.append(
+            f"the elevation {highest:g} m is that of the highest runway: the extract does not tell the aerodrome's"
+        )
+    return highest
 
 
 def _aerodrome(elements: list[Element], code: str) -> Element | None:
