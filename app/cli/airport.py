@@ -31,8 +31,9 @@ def import_(
     """
     import json
 
+    from app.ingest.osm_extract import parse_extract
     from pipeline.airport.geojson import AirportFault, airport_from_geojson
-    from pipeline.airport.osm import ImportFault, airport_geojson, parse_extract
+    from pipeline.airport.osm import ImportFault, airport_geojson
 
     try:
         document = airport_geojson(parse_extract(file.read_bytes()), icao, name, elevation=elevation)
@@ -95,6 +96,9 @@ def _summarise(document: dict[str, Any]) -> None:
     typer.echo(f"{document.get('icao', '')}  {document.get('name', '')}")
     elevation = document.get("elevation_m")
     typer.echo(f"Elevation: {'not known' if elevation is None else f'{elevation:g} m'}")
+    elements = [one["properties"] for one in document["features"] if one["properties"]["kind"] == "RunwayElement"]
+    runways = [str(one.get("runway")) for one in elements if one.get("status", "open") == "open"]
+    typer.echo(f"Runways: {', '.join(runways)}")
     _table("Features", dict(sorted(counts.items())))
     told = document.get("import")
     if isinstance(told, dict):

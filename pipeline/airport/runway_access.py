@@ -130,10 +130,7 @@ def walk_outward(
     for other in others:
         at_other |= shapely.contains_xy(other, east, north)
     at_other &= ~at_runway
-    along = np.asarray(centreline.coords[-1]) - np.asarray(centreline.coords[0])
-    along = along / np.hypot(*along)
-    forward = (lanes.points - np.asarray(centreline.coords[0])) @ along
-    abeam = (forward >= 0.0) & (forward <= centreline.length)  # a lane off the end of a runway leads to it
+    along, abeam = _beside(lanes, centreline)
     kept_clear = np.zeros(len(east), np.bool_) if keep_clear is None else keep_clear
     stop = set(blocked)
     queue = [(0.0, int(point), -1) for point in np.flatnonzero(at_runway)]
@@ -165,6 +162,14 @@ def walk_outward(
     _leave_lanes_alongside(access, width, away)
     access.inside |= at_runway | at_other  # a lane on the pavement of a runway that crosses is not outside
     return access
+
+
+def _beside(lanes: Lanes, centreline: LineString) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """The direction of a runway, and (points,) which lie beside it: a lane off its end leads to it."""
+    start, end = np.asarray(centreline.coords[0]), np.asarray(centreline.coords[-1])
+    along = (end - start) / np.hypot(*(end - start))
+    forward = (lanes.points - start) @ along
+    return along, (forward >= 0.0) & (forward <= centreline.length)
 
 
 def _alongside(lanes: Lanes, access: Access, point: int, along: NDArray[np.float64]) -> bool:

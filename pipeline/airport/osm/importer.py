@@ -65,7 +65,7 @@ def airport_geojson(
 ) -> dict[str, Any]:
     """One FeatureCollection (longitude, latitude) of the airport `icao` in an extract of OpenStreetMap.
 
-    extract: a document of `parse_extract`: Overpass JSON with the geometry inline or with the nodes beside, GeoJSON of
+    extract: Overpass JSON with the geometry inline or with the nodes beside, GeoJSON of
     overpass-turbo, or OpenStreetMap XML. name: of the airport, when the extract has no aerodrome element that tells
     it. elevation: metres above mean sea level; by default that of the aerodrome element, or of the highest runway that
     has one. Top-level members besides the features: icao, name, reference, elevation_m (when it is known), attribution,

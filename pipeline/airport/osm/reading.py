@@ -1,8 +1,8 @@
 """The elements of an extract with their geometry, wherever the document keeps it.
 
 Overpass JSON with the geometry inline ("out geom") or with the nodes as elements of their own ("out body; >; out skel")
-(https://wiki.openstreetmap.org/wiki/Overpass_API/Overpass_QL#Output_Format_(out:json)), and what `turbo` and `osm_xml`
-make of the other formats.
+(https://wiki.openstreetmap.org/wiki/Overpass_API/Overpass_QL#Output_Format_(out:json)), and what `turbo` and
+`app.ingest.osm_xml` make of the other formats.
 """
 
 from __future__ import annotations

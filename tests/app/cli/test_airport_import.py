@@ -43,6 +43,7 @@ def test_every_format(tmp_path: Path, form: Any) -> None:
 
 def test_what_is_lost_not_used_or_doubtful_is_printed(tmp_path: Path) -> None:
     _, output, target = imported(tmp_path, json.dumps(FIELD).encode())
+    assert "Runways: 09/27" in output
     assert "Elevation: 88.7 m" in output
     assert "1  TaxiwayHoldingPosition" in output[output.index("Derived") : output.index("Left out")]
     assert "1  runway for helicopters or models" in output[output.index("Left out") : output.index("Not used")]

@@ -8,7 +8,7 @@ from typing import Any
 from xml.etree.ElementTree import Element as Node
 from xml.etree.ElementTree import ParseError
 
-from pipeline.airport.osm.elements import ImportFault
+from pipeline.airport.osm import ImportFault
 
 
 def document_of_xml(octets: bytes) -> dict[str, Any]:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from pipeline.airport.osm.elements import ImportFault
-from pipeline.airport.osm.osm_xml import document_of_xml
+from app.ingest.osm_xml import document_of_xml
+from pipeline.airport.osm import ImportFault
 
 NO_TEXT = {b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"PK\x03\x04": "zip"}
 """How compressed files begin."""
