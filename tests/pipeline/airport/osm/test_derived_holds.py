@@ -112,6 +112,17 @@ def test_between_two_runways_without_room_none_is_made_and_the_import_says_so() 
     assert sum("taxiway X" in one and "no room" in one for one in told) == 2
 
 
+def test_before_a_taxiway_between_two_runways_there_is_no_room() -> None:
+    told, airport = made(
+        runway(ref="09L/27R"),
+        runway([(-1200, -130), (1200, -130)], ref="09R/27L"),
+        taxiway([(0, 0), (0, -65)], ref="X"),
+        taxiway([(-800, -65), (0, -65), (800, -65)], ref="P"),
+    )
+    assert airport.holding_positions == ()
+    assert any("taxiway X" in one and "no room" in one for one in told)
+
+
 def test_near_another_runway_it_lies_clear_of_both() -> None:
     """The ends of both runways are on one taxiway; at 90 m of the one, who waits would be 60 m from the other."""
     told, airport = made(
