@@ -22,7 +22,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.ingest.captures import open_capture
+from app.ingest.captures import Choice, open_capture
 from app.ingest.polar_images import open_images
 from app.ingest.recording import (
     Recording,
@@ -41,12 +41,20 @@ MAX_SCANS = 1_000_000
 
 
 def open_recording(
-    path: Path, *, site: RadarSite | None = None, blocks_per_scan: int = 32, port: int | None = None
+    path: Path,
+    *,
+    site: RadarSite | None = None,
+    blocks_per_scan: int = 32,
+    port: int | None = None,
+    sac: int | None = None,
+    sic: int | None = None,
+    resample: bool = False,
 ) -> Recording:
     """The recording at `path`.
 
     site: how the radar is described (else as the file says, or as it can be told from it). port: UDP port of the video
-    in a capture (else all). Raises RecordingError.
+    in a capture (else all). sac, sic: which source in a capture is taken; there must be one choice. resample: cells of
+    another length than the most frequent one are brought to that instead of left out. Raises RecordingError.
     """
     if not path.exists():
         raise RecordingError(f"{path}: there is no such file or folder")
@@ -56,7 +64,7 @@ def open_recording(
         elif path.suffix == ".npz":
             made = _npz(path, blocks_per_scan)
         elif path.suffix in (".pcap", ".pcapng", ".cap"):
-            return open_capture(path, site, blocks_per_scan, port)
+            return open_capture(path, site, blocks_per_scan, port, Choice(sac, sic, resample))
         else:
             raise RecordingError(f"{path}: neither .npz, .pcap, .pcapng nor a folder of PNG files")
     except OSError as error:
