@@ -54,6 +54,10 @@ class Refusals:
         first = self._rules.first_cell
         self.newest[:] = (WRONG_CELL_COUNT, first + cells, first, round(self._rules.cell_fs), -1)
 
+    def forget_newest(self) -> None:
+        """What was refused is told; what comes next is told anew."""
+        self.newest[:] = -1
+
     def words(self) -> str:
         """What was refused last and what it should have been, such as "cells 900, settings say 1024"; or nothing."""
         rules, said = self._rules, []

@@ -26,6 +26,7 @@ from pipeline.assemble.state import (
     OUT_OF_SEQUENCE,
     PREVIOUS_END,
     PREVIOUS_START,
+    REFUSED_WHY,
     REORDER,
     RESTART,
     SEEN,
@@ -35,6 +36,8 @@ from pipeline.assemble.state import (
     SOURCE,
     SOURCE_SILENT_TURNS,
     SPACING,
+    WRONG_CELL_COUNT,
+    WRONG_GEOMETRY,
     WRONG_SOURCE,
 )
 from pipeline.kernels.compiled import allocating
@@ -46,7 +49,8 @@ def wanted(one, arrival, rules, state, clock, seen, counts, refused):  # type: i
     source = one[7]
     if (source & rules.source_mask) != rules.source:
         counts[WRONG_SOURCE] += 1
-        refuse(one, WRONG_SOURCE, refused)
+        if refused[REFUSED_WHY] not in (WRONG_GEOMETRY, WRONG_CELL_COUNT):  # those are of the wanted source
+            refuse(one, WRONG_SOURCE, refused)
         return False
     if state[HAVE] == 0 or source == state[SOURCE]:
         return True
