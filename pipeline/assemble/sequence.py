@@ -6,6 +6,7 @@ import numpy as np
 
 from pipeline.assemble.fit import fits, refuse
 from pipeline.assemble.state import (
+    BEFORE,
     BELIEVED,
     CANDIDATE,
     CLAIMED,
@@ -88,7 +89,9 @@ def in_sequence(one, arrival, rules, state, seen, counts):  # type: ignore[no-un
     late = False
     if state[LAST_ID] < 0:
         gap = 1
-    if gap <= GREATEST_GAP:
+    if _of_the_end(one, state):
+        late = True
+    elif gap <= GREATEST_GAP:
         if gap > 1:
             counts[LOST] += gap - 1
             lose_touch(state)
@@ -97,6 +100,7 @@ def in_sequence(one, arrival, rules, state, seen, counts):  # type: ignore[no-un
         state[LAST_ID] = message
     elif message < state[LAST_ID] and _goes_on(one, state):
         # numbers that begin anew each turn, or wrap before 32 bits
+        state[BEFORE] = state[LAST_ID]
         state[LATE_RUN] = 0
         state[CANDIDATE] = -1
         state[LAST_ID] = message
@@ -120,6 +124,14 @@ def in_sequence(one, arrival, rules, state, seen, counts):  # type: ignore[no-un
     seen[slot, SEEN_TIME] = one[6]
     seen[slot, SEEN_ARRIVAL] = micros
     return 1 if late else 0
+
+
+@allocating
+def _of_the_end(one, state):  # type: ignore[no-untyped-def]
+    """The message was overtaken by the first ones of numbers that have begun anew."""
+    behind = (state[PREVIOUS_START] - one[1]) & 0xFFFF
+    begun = state[BEFORE] >= 0 and state[LAST_ID] < state[BEFORE] and state[PREVIOUS_START] >= 0
+    return begun and one[0] > state[LAST_ID] and abs(one[0] - state[BEFORE]) <= BELIEVED and 0 < behind < GREATEST_STEP
 
 
 @allocating

@@ -45,7 +45,8 @@ PLACED_FIELDS = 4
 (
     HAVE, LAST_ID, NEWEST, PREVIOUS_START, PREVIOUS_END, CLAIMED, EXTENSION, SPACING, ODD_RUN, END_TRUST, CANDIDATE,
     DUPLICATE_RUN, LATE_RUN, LATE_ID, TIME_RUN, AZIMUTH_RUN, STEPPED, GAP, SOURCE, LAST_COUNT,
-) = range(20)  # fmt: skip
+    BEFORE,
+) = range(21)  # fmt: skip
 LAST_TIME, LAST_ARRIVAL = 0, 1
 SEEN_KEY, SEEN_TIME, SEEN_ARRIVAL = range(3)
 """Columns of `seen` (SEEN, 3): what a message is told by, its time of day, and its arrival in microseconds."""
@@ -105,7 +106,7 @@ class GridRules(NamedTuple):
 
 def new_state() -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
     """State, clock and messages seen before the first message."""
-    state = np.zeros(20, np.int64)
-    state[[LAST_ID, PREVIOUS_START, PREVIOUS_END, CLAIMED, CANDIDATE, LAST_COUNT]] = -1
+    state = np.zeros(21, np.int64)
+    state[[LAST_ID, PREVIOUS_START, PREVIOUS_END, CLAIMED, CANDIDATE, LAST_COUNT, BEFORE]] = -1
     state[GAP] = 1
     return state, np.zeros(2), np.full((SEEN, 3), -1, np.int64)

@@ -62,6 +62,19 @@ def test_a_loss_where_the_numbers_begin_anew_is_a_loss() -> None:
     assert counters["duplicate"] == counters["out_of_sequence"] == counters["restart"] == 0
 
 
+@pytest.mark.parametrize(("every", "first"), [(AZIMUTHS, AZIMUTHS), (50, 100)])
+def test_what_is_overtaken_where_the_numbers_begin_anew_is_late_and_no_loss(every: int, first: int) -> None:
+    plain = stream(3)
+    messages = anew(plain, every)
+    messages[first - 1], messages[first], messages[first + 1] = (
+        messages[first], messages[first + 1], messages[first - 1],
+    )  # fmt: skip
+    _, counters = assembled(messages, arrivals(plain))
+    told = faults(counters)
+    assert set(told) <= {"late", "reordered"}
+    assert sum(told.values()) == 1
+
+
 @pytest.mark.parametrize("timed", [True, False])
 def test_duplicates_are_told_from_numbers_that_begin_anew(timed: bool) -> None:
     plain = stream(3)
