@@ -97,6 +97,11 @@ def build_parts(settings: Settings, verbs: Iterable[str]) -> dict[str, Any]:
     return {verb: _part(verb, getattr(settings.parts, verb)) for verb in verbs}
 
 
+def scans_to_learn(settings: Settings) -> int:
+    """Turns in which the chosen detector only learns. Raises SettingsError."""
+    return int(getattr(build_parts(settings, ("detect",))["detect"], "learn_scans", 0))
+
+
 def parts_of(chain: RadarChain) -> dict[str, Any]:
     """The part of each verb of FRONT_END."""
     return {verb: getattr(chain, word) for verb, word in FRONT_END.items()}

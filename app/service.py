@@ -327,8 +327,11 @@ class SurfaceService:
         switch = self._switches[site.id]
         times = self._radar_times[site.id]
         clock = times.words()
-        detail = "; ".join(words for words in (clock, worker.cuts.words(), switch.learning) if words)
-        status = "degraded" if clock and worker.status == "ok" else worker.status
+        refused = receiver.refused.words() if receiver is not None else ""
+        detail = "; ".join(words for words in (clock, worker.cuts.words(), switch.learning, refused) if words)
+        status = worker.status
+        if (status == "ok" and (clock or refused)) or (status == "waiting" and refused):
+            status = "degraded"
         state = SensorState(site.id, "radar", status, worker.last_time, site.simulated, detail, counters, switch.names)
         return times.shown(state)
 

@@ -91,6 +91,7 @@ class RadarSettings(Section):
     period_s: float = Field(1.0, gt=0)
     db_per_step: float = Field(0.3125, gt=0)
     blocks_per_scan: int = Field(32, ge=1, le=4096, description="sweeps are worked on in this many blocks a turn")
+    resample: bool = Field(False, description="bring cells of another length to range_step_m instead of refusing them")
     simulated: bool = False
     clock: ClockSettings = ClockSettings()
     udp: UdpSettings | None = UdpSettings()

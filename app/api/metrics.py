@@ -12,6 +12,7 @@ from starlette.responses import Response
 
 from app.api.context import Context
 from app.api.units import unit_of
+from app.runtime.refused_video import refusal_in
 from app.wire import CLASSES, PHASES
 from pipeline.picture import Picture, SensorState
 
@@ -76,16 +77,22 @@ class ServiceCollector(Collector):
         offset = GaugeMetricFamily(
             "airside_sensor_clock_offset_seconds", "a sensor's clock less the time of arrival", labels=["sensor"]
         )
+        refused = GaugeMetricFamily(
+            "airside_sensor_refused", "1 while a radar's video is refused, and why", labels=["sensor", "reason"]
+        )
         last = GaugeMetricFamily("airside_sensor_last_seconds", "Unix time of the newest data", labels=["sensor"])
         sensors = self.context.service.sensors()
         for sensor in sensors:
             for name in STATUS:
                 status.add_metric([sensor.id, name], float(sensor.status == name))
+            why = refusal_in(sensor.detail) if sensor.kind == "radar" else ""
+            if why:
+                refused.add_metric([sensor.id, why], 1.0)
             if sensor.last is not None:
                 last.add_metric([sensor.id], sensor.last)
             if sensor.clock_offset_s is not None:
                 offset.add_metric([sensor.id], sensor.clock_offset_s)
-        yield from (*_counts(sensors), status, last, offset)
+        yield from (*_counts(sensors), status, refused, last, offset)
 
     def _feed(self) -> Iterator[Metric]:
         hub = self.context.hub

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from app.ingest.recording import Recording
-    from app.settings import RadarSettings, Settings
+    from app.replay.destination import Destination
 
 
 File = Annotated[
@@ -54,8 +54,23 @@ HttpPort = Annotated[
 ]
 Radar = Annotated[str | None, typer.Option(help="Video: the radar of the settings that it is sent as; else the first.")]
 To = Annotated[str | None, typer.Option(help="Video: udp://host:port; else the radar's own port on this machine.")]
-Loop = Annotated[bool, typer.Option("--loop", help="Video: begin again at the end.")]
+Loop = Annotated[bool, typer.Option("--loop", help="Video: begin again at the end, until interrupted.")]
 Port = Annotated[int | None, typer.Option(min=1, max=65535, help="Video: take only this UDP port of a capture.")]
+Sac = Annotated[
+    int | None,
+    typer.Option(min=0, max=255, help="Video: take only this SAC of a capture; what else has none is sent with it."),
+]
+Sic = Annotated[int | None, typer.Option(min=0, max=255, help="Video: the same for the SIC.")]
+Rewrite = Annotated[
+    bool,
+    typer.Option(
+        "--rewrite-source", help="Video: send it with the SAC and SIC that the radar is set to, not with its own."
+    ),
+]
+Resample = Annotated[
+    bool,
+    typer.Option("--resample", help="Video: convert cells of other lengths in a capture instead of leaving them out."),
+]
 SettingsFile = Annotated[
     Path | None, typer.Option("--settings", "-s", envvar="AIRSIDE_SETTINGS", help="Video: settings of the service.")
 ]
@@ -80,6 +95,10 @@ def replay(
     to: To = None,
     loop: Loop = False,
     port: Port = None,
+    sac: Sac = None,
+    sic: Sic = None,
+    rewrite_source: Rewrite = False,
+    resample: Resample = False,
     settings: SettingsFile = None,
 ) -> None:
     """Replay a journal, or send recorded radar video to a running service.
@@ -91,7 +110,7 @@ def replay(
     Radar video is sent as ASTERIX CAT240, as if the radar were turning now:
     [bold]airside replay turns.npz[/bold] sends to the first radar of the settings on this machine;
     [bold]airside replay turns.pcap --to udp://239.1.2.3:8600[/bold] to wherever you say;
-    [bold]airside replay turns.npz --headless[/bold] prints what the detector makes of it.
+    [bold]airside replay turns.npz --headless --loop[/bold] prints what the detector makes of it, once it has learned.
     """
     from rich.console import Console
 
@@ -106,7 +125,8 @@ def replay(
     elif asked:
         raise fail(f"{file}: --verify, --from, --until, --set and --json are for journals (.mcap)")
     else:
-        _replay_video(console, file, speed, headless, (radar, to), loop, port, settings)
+        wanted = (port, sac, sic, resample)
+        _replay_video(console, file, speed, headless, (radar, to), loop, wanted, rewrite_source, settings)
 
 
 def _replay_video(
@@ -116,27 +136,31 @@ def _replay_video(
     headless: bool,
     destination: tuple[str | None, str | None],
     loop: bool,
-    port: int | None,
+    wanted: tuple[int | None, int | None, int | None, bool],
+    rewrite: bool,
     settings: Path | None,
 ) -> None:
     from app.console import fail
     from app.contract import Refused
     from app.ingest.recordings import open_recording
+    from app.replay.destination import find_destination, source_to_send
+    from app.replay.plots import print_plots
     from app.settings import SettingsError, load
 
+    port, sac, sic, resample = wanted
     try:
-        recording = open_recording(file, port=port)
+        recording = open_recording(file, port=port, sac=sac, sic=sic, resample=resample)
         _describe(console, recording)
         loaded = load(settings)
         if headless:
-            _print_plots(console, recording, loaded)
+            print_plots(console, recording, loaded, loop)
+            _left_out(console, recording)
             return
         radar, to = destination
-        address, chosen = _destination(loaded, radar, to)
-        if chosen is not None and to is None:
-            _must_fit(recording, chosen)
-        interface = chosen.udp.interface if chosen is not None and chosen.udp is not None else "0.0.0.0"
-        _send(console, recording, address, interface, speed, loop)
+        found = find_destination(loaded, radar, to)
+        if to is None:
+            found.must_fit(recording)
+        _send(console, recording, found, source_to_send(recording, found, (sac, sic), rewrite, to is None), speed, loop)
     except (Refused, SettingsError, OSError) as error:
         raise fail(str(error)) from error
     except KeyboardInterrupt:
@@ -192,6 +216,8 @@ def _check(json: Path) -> None:
 
 
 def _describe(console: Console, recording: Recording) -> None:
+    from rich.markup import escape
+
     video = recording.site.video
     turns = "" if recording.scans is None else f"{recording.scans} turns, "
     console.print(
@@ -202,45 +228,6 @@ def _describe(console: Console, recording: Recording) -> None:
     )
     for note in recording.notes:
         console.print(note, style="yellow", highlight=False, markup=False)
-
-
-def _destination(settings: Settings, radar: str | None, to: str | None) -> tuple[tuple[str, int], RadarSettings | None]:
-    from urllib.parse import urlsplit
-
-    from app.settings import SettingsError
-
-    names = {one.id: one for one in settings.radars}
-    if radar is not None and radar not in names:
-        raise SettingsError(f"no radar is called {radar!r}; there are: {', '.join(names) or 'none'}")
-    chosen = names[radar] if radar is not None else next(iter(names.values()), None)
-    if to is not None:
-        parts = urlsplit(to)
-        try:
-            if parts.scheme == "udp" and parts.hostname and parts.port:
-                return (parts.hostname, parts.port), chosen
-        except ValueError:
-            pass
-        raise SettingsError(f"--to {to}: must look like udp://127.0.0.1:8600")
-    if chosen is None:
-        return ("127.0.0.1", 8600), None
-    if chosen.udp is None or chosen.udp.port == 0:
-        raise SettingsError(f"radar {chosen.id} has no fixed UDP port; say where to send with --to")
-    host = chosen.udp.group or chosen.udp.address
-    return ("127.0.0.1" if host in ("0.0.0.0", "::") else host, chosen.udp.port), chosen
-
-
-def _must_fit(recording: Recording, radar: RadarSettings) -> None:
-    from app.settings import SettingsError
-
-    video = recording.site.video
-    fits = (video.azimuths, video.ranges) == (radar.azimuths, radar.ranges)
-    if not fits or abs(video.range_step_m / radar.range_step_m - 1) * video.ranges > 0.5:
-        raise SettingsError(
-            f"radar {radar.id} is set to {radar.azimuths} azimuths of {radar.ranges} cells of {radar.range_step_m:g} m "
-            f"and would refuse this recording: set azimuths = {video.azimuths}, ranges = {video.ranges}, "
-            f"range_step_m = {video.range_step_m:.6g}, first_range_m = {video.first_range_m:.6g}, "
-            f"period_s = {video.period_s:.4g}, or send it elsewhere with --to"
-        )
 
 
 def _progress(console: Console) -> Any:
@@ -261,16 +248,17 @@ def _progress(console: Console) -> Any:
 
 
 def _send(
-    console: Console, recording: Recording, address: tuple[str, int], interface: str, speed: float, loop: bool
+    console: Console, recording: Recording, to: Destination, source: tuple[int, int], speed: float, loop: bool
 ) -> None:
     from app.ingest.replay import Replayer
 
-    replayer = Replayer(recording, address, speed, interface=interface)
+    address, (sac, sic) = to.address, source
+    replayer = Replayer(recording, address, speed, sac=sac, sic=sic, interface=to.interface)
     with _progress(console) as progress:
         total = None if loop else recording.scans
         task = progress.add_task(f"to udp://{address[0]}:{address[1]}", total=total)
         replayer.run(lambda block: progress.advance(task, 1.0 if block.last else 0.0), loop)
-    console.print(f"{replayer.sent} datagrams sent", highlight=False)
+    console.print(f"{replayer.sent} datagrams sent as SAC {sac} SIC {sic}", highlight=False)
     if replayer.refused:
         console.print(f"[yellow]{replayer.refused} found nobody listening at that port[/yellow]")
     _left_out(console, recording)
@@ -281,31 +269,3 @@ def _left_out(console: Console, recording: Recording) -> None:
     left = {name: count for name, count in recording.counters.items() if count and name not in plain}
     if left:
         console.print(f"[yellow]left out: {', '.join(f'{name} {count}' for name, count in left.items())}[/yellow]")
-
-
-def _print_plots(console: Console, recording: Recording, settings: Settings) -> None:
-    from app.assembly import radar_chain
-    from pipeline.tables import Plots, SectorPlots
-
-    chain = radar_chain(recording.site, 0, settings, None)
-    turn: list[Plots] = []
-
-    def show(scan: int, time: float) -> None:
-        plots = Plots.concatenate(turn)
-        turn.clear()
-        strong = plots[plots.peak_amplitude.argsort()[::-1][:5]] if len(plots) else plots
-        told = "  ".join(
-            f"({one.east[0]:.0f}, {one.north[0]:.0f}) m" for one in (strong[i] for i in range(len(strong)))
-        )
-        console.print(f"turn {scan:5d}  {time:.2f}  {len(plots):4d} plots  {told}", highlight=False)
-
-    scan, time = 0, float("nan")
-    for block in recording.blocks():
-        if block.scan != scan and turn:
-            show(scan, time)
-        sector: SectorPlots = chain.process(block)
-        scan, time = block.scan, float(block.time[-1])
-        turn.append(sector.plots)
-    turn.append(chain.flush().plots)
-    show(scan, time)
-    _left_out(console, recording)

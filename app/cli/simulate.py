@@ -56,7 +56,9 @@ def traffic(
 @simulate.command()
 def video(
     output: Annotated[Path, typer.Option(help="The file to write: .npz (scans, t) or .pcap (CAT240 over UDP).")],
-    seconds: Annotated[int, typer.Option(min=1, max=3600, help="How many turns of one second.")] = 10,
+    seconds: Annotated[
+        int, typer.Option(min=1, max=3600, help="How many turns of one second; the detector learns in the first ones.")
+    ] = 30,
     after: Annotated[float, typer.Option(min=0.0, help="Begin so many seconds into the demonstration.")] = 0.0,
     start: Annotated[float, typer.Option(help="UTC seconds that the first sweep carries.")] = 1_700_000_000.0,
     settings: Annotated[Path | None, typer.Option(help="Settings file.")] = None,
@@ -67,6 +69,7 @@ def video(
     from rich.console import Console
     from rich.progress import track
 
+    from app.assembly import scans_to_learn
     from app.console import fail
     from app.demo.record import record_video
     from app.settings import SettingsError, load
@@ -80,3 +83,7 @@ def video(
     except (SettingsError, ValueError, OSError) as error:
         raise fail(str(error)) from error
     console.print(f"{seconds} turns -> {output}, the truth -> {truth}")
+    learning = scans_to_learn(loaded)
+    if seconds <= learning:
+        advice = "make more with --seconds, or replay with --loop"
+        console.print(f"[yellow]the detector learns for {learning} turns: {advice}[/yellow]")

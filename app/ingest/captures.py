@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,22 +19,48 @@ from app.ingest.containers.packets import CaptureError, Datagram
 from app.ingest.containers.times import UNDATED, timed
 from app.ingest.recording import MAX_AZIMUTHS, Recording, RecordingError, video_format
 from pipeline.assemble import Assembler
-from pipeline.asterix.cat240_batch import CELLS, DURATION, END, FIRST_CELL, START, TIME, decode_batch
+from pipeline.assemble.refusal import FS_PER_M, source_name
+from pipeline.assemble.survey import SourceSurvey, survey
+from pipeline.asterix.cat240_batch import decode_batch
 from pipeline.sites import RadarSite
 from pipeline.tables import Sweeps
 
-LIGHT_M_PER_S = 299_792_458.0
 BATCH = 256
 
+SURVEYED = 100_000
+"""Messages from which the radar is told: most of half a minute of a large one."""
 
-def open_capture(path: Path, site: RadarSite | None, blocks: int, port: int | None) -> Recording:
+USUAL_AZIMUTHS = 4096
+"""A turn of a radar that shows one azimuth only."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """What is taken of a capture; see `app.ingest.recordings.open_recording`."""
+
+    sac: int | None = None
+    sic: int | None = None
+    resample: bool = False
+
+    def fits(self, source: int) -> bool:
+        """SAC << 8 | SIC is the source that is asked for, or none is."""
+        return self.sac in (None, source >> 8) and self.sic in (None, source & 255)
+
+
+def open_capture(
+    path: Path, site: RadarSite | None, blocks: int, port: int | None, choice: Choice = Choice()
+) -> Recording:
     """The recording in a capture; see `app.ingest.recordings.open_recording`. Raises RecordingError."""
     counters: Counter[str] = Counter()
-    chosen = site if site is not None else _radar_of(path, port)
+    found = _source_of(path, port, choice)
+    chosen = site if site is not None else _radar_of(path, found)
 
     def read() -> Iterator[Sweeps]:
         counters.clear()
-        assembler = Assembler(chosen, 0, min(blocks, chosen.video.azimuths))
+        assembler = Assembler(
+            chosen, 0, min(blocks, chosen.video.azimuths), sac=found.source >> 8, sic=found.source & 255,
+            resample=choice.resample,
+        )  # fmt: skip
         for batch in _batches(path, port, counters):
             made = assembler.push_datagrams(*_rows(batch))
             counters.update(_grown(assembler.counters, counters))
@@ -42,9 +69,13 @@ def open_capture(path: Path, site: RadarSite | None, blocks: int, port: int | No
         counters.update(_grown(assembler.counters, counters))
         yield from made
         if not counters["sweeps"]:
-            raise RecordingError(f"{path}: no radar video that fits {chosen.id} in it ({_told(counters)})")
+            why = assembler.refusals.words()
+            raise RecordingError(
+                f"{path}: no radar video that fits {chosen.id} in it ({_told(counters)})" + f"; {why}" * bool(why)
+            )
 
-    return Recording(path, chosen, None, read, counters, _notes(path))
+    source = (found.source >> 8, found.source & 255)
+    return Recording(path, chosen, None, read, counters, _notes(path) + _cells_told(found, choice), source)
 
 
 def _notes(path: Path) -> tuple[str, ...]:
@@ -101,31 +132,47 @@ def _rows(batch: list[Datagram]) -> tuple[NDArray[np.uint8], NDArray[np.int32], 
     return rows, lengths, np.array([one.time for one in batch])
 
 
-def _radar_of(path: Path, port: int | None) -> RadarSite:
-    """What the first messages of a capture say about the radar."""
+def _source_of(path: Path, port: int | None, choice: Choice) -> SourceSurvey:
+    """What the first messages of a capture say about its radar. Raises RecordingError when there is not one."""
     parts: list[NDArray[np.int64]] = []
+    times: list[NDArray[np.float64]] = []
     reasons: dict[str, int] = {}
     counters, met = Counter[str](), Met()
     for batch in _batches(path, port, counters, met):
-        rows, lengths, _ = _rows(batch)
-        parts += [one.fields for one, _ in decode_batch(rows, lengths, reasons)]
-        if sum(map(len, parts)) >= 20_000:
+        rows, lengths, arrival = _rows(batch)
+        for one, origin in decode_batch(rows, lengths, reasons):
+            parts.append(one.fields)
+            times.append(arrival[origin])
+        if sum(map(len, parts)) >= SURVEYED:
             break
     fields = np.concatenate(parts) if parts else np.zeros((0, 10), np.int64)
     if not len(fields):
         raise RecordingError(f"{path}: no CAT240 video in it ({_nothing(counters, reasons, met, port)})")
-    width = float(np.median((fields[:, END] - fields[:, START]) & 0xFFFF))
-    steps = np.diff(fields[:, START]) & 0xFFFF
-    steps = steps[(steps > 0) & (steps < 0x4000)]
-    if width == 0:
-        width = float(np.median(steps)) if len(steps) else 16.0
-    timed = fields[fields[:, TIME] >= 0]
-    turns = float((np.diff(timed[:, START]) & 0xFFFF).sum()) / 65536 if len(timed) > 1 else 0.0
-    elapsed = ((int(timed[-1, TIME]) - int(timed[0, TIME])) % (86400 * 128)) / 128 if len(timed) > 1 else 0.0
-    period = elapsed / turns if turns > 0.5 and elapsed > 0 else 1.0
-    step = float(np.median(fields[:, DURATION])) * 1e-15 * LIGHT_M_PER_S / 2
-    first = int(fields[:, FIRST_CELL].min())
-    ranges = int((fields[:, FIRST_CELL] + fields[:, CELLS]).max()) - first
-    azimuths = min(max(round(65536 / width), 1), MAX_AZIMUTHS)
-    video = video_format(path, (azimuths, ranges), period, {"first_range_m": first * step, "range_step_m": step})
-    return RadarSite(path.stem[:32], 0, 0, 0, video)
+    found = survey(fields, np.concatenate(times))
+    wanted = [one for one in found if choice.fits(one.source)]
+    if len(wanted) != 1:
+        listed = ", ".join(f"{source_name(one.source)} ({one.messages} messages)" for one in found)
+        first = (wanted or found)[0].source
+        raise RecordingError(
+            f"{path}: video of {len(found)} source{'s' * (len(found) > 1)} in it: {listed}; "
+            f"choose with --sac and --sic, such as --sac {first >> 8} --sic {first & 255}"
+        )
+    return wanted[0]
+
+
+def _radar_of(path: Path, found: SourceSurvey) -> RadarSite:
+    """The radar of a source, as its messages show it."""
+    step = found.durations[0][0] / FS_PER_M
+    azimuths = min(found.azimuths or USUAL_AZIMUTHS, MAX_AZIMUTHS)
+    period = found.period_s if math.isfinite(found.period_s) else 1.0
+    words = {"first_range_m": found.first_cell * step, "range_step_m": step}
+    return RadarSite(path.stem[:32], 0, 0, 0, video_format(path, (azimuths, found.ranges), period, words))
+
+
+def _cells_told(found: SourceSurvey, choice: Choice) -> tuple[str, ...]:
+    """What becomes of cells of other lengths."""
+    if len(found.durations) < 2:
+        return ()
+    usual, *others = [f"{duration / FS_PER_M:.4g} m in {many} messages" for duration, many in found.durations]
+    done = "brought to those of the first length" if choice.resample else "left out; --resample would convert them"
+    return (f"cells of {usual}; {', '.join(others)} are {done}",)

@@ -35,7 +35,7 @@ class Recording:
 
     blocks: gives the blocks of sweeps from the beginning; raises RecordingError where the file turns out to be damaged.
     counters: what was read and what was left out, by reason; grows while blocks are read. notes: what had to be assumed
-    or converted, for people.
+    or converted, for people. source: SAC and SIC of its messages, None when it has none.
     """
 
     path: Path
@@ -44,6 +44,7 @@ class Recording:
     blocks: Callable[[], Iterator[Sweeps]]
     counters: Counter[str] = field(default_factory=Counter)
     notes: tuple[str, ...] = ()
+    source: tuple[int, int] | None = None
 
 
 def blocks_of_turn(

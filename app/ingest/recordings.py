@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from app.ingest.captures import open_capture
+from app.ingest.captures import Choice, open_capture
 from app.ingest.npz import open_npz
 from app.ingest.polar_images import open_images
 from app.ingest.recording import Recording, RecordingError
@@ -19,12 +19,20 @@ __all__ = ["Recording", "RecordingError", "open_recording"]
 
 
 def open_recording(
-    path: Path, *, site: RadarSite | None = None, blocks_per_scan: int = 32, port: int | None = None
+    path: Path,
+    *,
+    site: RadarSite | None = None,
+    blocks_per_scan: int = 32,
+    port: int | None = None,
+    sac: int | None = None,
+    sic: int | None = None,
+    resample: bool = False,
 ) -> Recording:
     """The recording at `path`.
 
     site: how the radar is described (else as the file says, or as it can be told from it). port: UDP port of the video
-    in a capture (else all). Raises RecordingError.
+    in a capture (else all). sac, sic: which source in a capture is taken; there must be one choice. resample: cells of
+    another length than the most frequent one are brought to that instead of left out. Raises RecordingError.
     """
     if not path.exists():
         raise RecordingError(f"{path}: there is no such file or folder")
@@ -34,7 +42,7 @@ def open_recording(
         elif _is_zip(path):
             made = open_npz(path, blocks_per_scan)
         else:
-            return open_capture(path, site, blocks_per_scan, port)
+            return open_capture(path, site, blocks_per_scan, port, Choice(sac, sic, resample))
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}") from error
     if site is None:

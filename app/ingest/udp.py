@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from app.ingest import socket_kernel
 from app.runtime.host_clock import HostClock
+from app.runtime.refused_video import RefusedVideo
 from app.settings import RadarSettings, UdpSettings
 from pipeline.assemble import Assembler
 from pipeline.asterix.cat240_batch import FIELDS, VideoBatch
@@ -34,7 +35,13 @@ HOLD_S = 0.004
 TIMEOUT_S = 0.1
 """How long a silent socket is waited for before the thread looks whether it shall end."""
 
-RING_BYTES = 4 * 1024 * 1024
+ROW_OCTETS = 65536 + 64
+"""Room for one datagram: UDP has 65,535 octets at most. The 64 keep rows from falling on the same lines of the
+processor's cache."""
+
+RING_ROWS = 256
+"""Datagrams received at once at most; the system gives the memory of a row when it is first used."""
+
 _RXQ_OVFL = 40
 _RCVBUFFORCE = 33
 _MULTICAST_ALL = 49
@@ -54,8 +61,8 @@ class _Receiving(Protocol):
 class VideoReceiver:
     """Receives, decodes and assembles in its own thread; `deliver` is called there with every block and must not wait.
 
-    clock: of the time of arrival. last_heard: `time.monotonic()` of the newest datagram, None before the first. Raises
-    ValueError when the radar has no `udp` settings.
+    clock: of the time of arrival. last_heard: `time.monotonic()` of the newest datagram, None before the first.
+    refused: what is not taken, and why. Raises ValueError when the radar has no `udp` settings.
     """
 
     def __init__(
@@ -74,8 +81,10 @@ class VideoReceiver:
         self._deliver = deliver
         self._clock = clock if clock is not None else HostClock()
         self._assembler = Assembler(
-            site, index, min(radar_settings.blocks_per_scan, site.video.azimuths), sac=self._udp.sac, sic=self._udp.sic
-        )
+            site, index, min(radar_settings.blocks_per_scan, site.video.azimuths), sac=self._udp.sac,
+            sic=self._udp.sic, resample=radar_settings.resample,
+        )  # fmt: skip
+        self.refused = RefusedVideo(site.id)
         self._counts = dict.fromkeys(("datagrams", "octets", "truncated", "socket_overflow", "socket_errors"), 0)
         self._counts["deliver_failed"] = 0
         warm()
@@ -112,10 +121,10 @@ class VideoReceiver:
         return {**self._counts, **self._assembler.counters}
 
     def _run(self, opened: socket.socket) -> None:
-        width = min(65536, max(2048, 4 * self.site.video.ranges + 512))
-        count = max(64, RING_BYTES // width)
         ring: _Receiving = (
-            socket_kernel.Ring(count, width) if socket_kernel.AVAILABLE else PlainRing(count, width, opened)
+            socket_kernel.Ring(RING_ROWS, ROW_OCTETS)
+            if socket_kernel.AVAILABLE
+            else PlainRing(RING_ROWS, ROW_OCTETS, opened)
         )
         while not self._stopping.is_set():
             try:
@@ -146,6 +155,7 @@ class VideoReceiver:
             # one bad block must not end the feed of the radar
             counts["deliver_failed"] += 1
             log.exception("radar %s: datagrams could not be worked on", self.site.id)
+        self.refused.note(self.counters(), self._assembler.refusals)
 
 
 @cache

@@ -13,24 +13,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.assemble.fill import FILLED, order_and_fill
-from pipeline.assemble.order import COUNTERS, PLACED_FIELDS, SEEN, GridRules, new_state
+from pipeline.assemble.refusal import Refusals
+from pipeline.assemble.spacing import begin
+from pipeline.assemble.state import COUNTERS, HAVE, PLACED_FIELDS, GridRules, new_state
 from pipeline.asterix.cat240_batch import VideoBatch, decode_batch
+from pipeline.asterix.cat240_decode import REASONS
 from pipeline.sites import RadarSite
 from pipeline.tables import Sweeps
 
 LIGHT_M_PER_S = 299_792_458.0
+
+MOST_HELD = 64
+"""Messages that wait for a second azimuth, at most: a sweep in parts has fewer; a standing antenna has no second."""
 
 
 class Assembler:
     """The state of one radar's assembly.
 
     site: gives the grid and the offset of north. index: of the radar in the engine. blocks_per_scan: blocks a turn; a
-    block is handed on as soon as its last row is in. sac, sic: take messages of this source only; None takes any.
+    block is handed on as soon as its last row is in. sac, sic: take messages of this source only; None takes the one
+    that is heard first, and another when that falls silent. resample: bring cells of another length to the grid's
+    instead of refusing them; where they reach less far the rest is 0.
 
-    Rules: a message covers the grid rows whose centre lies between its start and end azimuth, or the row it lies in
-    when it is finer than the grid (cells of several such messages: the greatest). Parts of one azimuth that follow each
+    Rules: a message covers the grid rows whose centre lies between its start azimuth and that of the next one (its end
+    azimuth where the ends of this radar agree with that, see `pipeline.assemble.spacing`), or the row it lies in when
+    it is finer than the grid (cells of several such messages: the greatest). Parts of one azimuth that follow each
     other in range are joined; a row that stays short is not handed on. What is not taken is counted by reason, see
-    `pipeline.assemble.order.COUNTERS`.
+    `pipeline.assemble.state.COUNTERS`, and told in words by `refusals`.
     """
 
     def __init__(
@@ -41,6 +50,7 @@ class Assembler:
         *,
         sac: int | None = None,
         sic: int | None = None,
+        resample: bool = False,
     ) -> None:
         video = site.video
         if not 1 <= blocks_per_scan <= video.azimuths:
@@ -56,13 +66,16 @@ class Assembler:
             period=video.period_s,
             source_mask=(0 if sac is None else 0xFF00) | (0 if sic is None else 0x00FF),
             source=(sac or 0) << 8 | (sic or 0),
+            resample=int(resample),
         )
         edges = -(-np.arange(blocks_per_scan + 1) * video.azimuths // blocks_per_scan)
         self._edges = edges.astype(np.int64)
-        self._order, self._clock = new_state()
-        self._seen = np.full(SEEN, -1, np.int64)
+        self._order, self._clock, self._seen = new_state()
         self._counts = np.zeros(len(COUNTERS), np.int64)
-        self._decoding: dict[str, int] = {"malformed": 0, "wrong_category": 0, "compressed": 0, "summary": 0}
+        self.refusals = Refusals(self._rules)
+        self._held: VideoBatch | None = None
+        self._held_arrival = np.zeros(0)
+        self._decoding: dict[str, int] = dict.fromkeys((*REASONS, "summary"), 0)
         self._block = np.array([-1, -1, 0, 0, 0, 0], np.int64)
         self._rows = int(np.diff(edges).max())
         self._arrived = math.nan
@@ -83,19 +96,33 @@ class Assembler:
     def push(self, batch: VideoBatch, arrival: NDArray[np.float64]) -> list[Sweeps]:
         """Take messages in the order of their arrival; gives the blocks that they complete.
 
-        arrival: (n,) float64 UTC seconds.
+        arrival: (n,) float64 UTC seconds. The very first message waits for the next azimuth when its end does not fit
+        the grid.
         """
+        arrival = np.ascontiguousarray(arrival, np.float64)
+        self.refusals.note(batch.fields)
+        if self._held is not None:
+            batch, arrival = self._held.joined(batch), np.concatenate([self._held_arrival, arrival])
+            self._held = None
+        if self._order[HAVE] == 0 and not self._begun(batch) and len(batch) <= MOST_HELD:
+            self._held, self._held_arrival = batch.joined(VideoBatch.of([])), arrival
+            return []
+        return self._push(batch, arrival)
+
+    def _begun(self, batch: VideoBatch) -> bool:
+        return bool(begin(batch.fields, self._rules, self._order, self.refusals.newest, self._counts))
+
+    def _push(self, batch: VideoBatch, arrival: NDArray[np.float64]) -> list[Sweeps]:
         n = len(batch)
         placed = np.empty((n, PLACED_FIELDS), np.int64)
         times = np.empty((n, 2))
-        arrival = np.ascontiguousarray(arrival, np.float64)
         blocks: list[Sweeps] = []
         at, row = -1, -1
         while True:
             at, row, full = order_and_fill(
                 batch.fields, batch.octets, arrival, self._rules, self._order, self._clock, self._seen, placed, times,
-                at, row, self._edges, self._block, self._amplitude, self._cover, self._key, self._time, self._azimuth,
-                self._counts,
+                self.refusals.newest, at, row, self._edges, self._block, self._amplitude, self._cover,
+                self._converted, self._key, self._time, self._azimuth, self._counts,
             )  # fmt: skip
             if full != FILLED:
                 self._arrived = float(arrival[-1]) if n else self._arrived
@@ -105,9 +132,11 @@ class Assembler:
                 blocks.append(block)
 
     def flush(self) -> list[Sweeps]:
-        """What is in the open block (zero or one block); for the end of a recording."""
+        """What is in the open block, or still waits; for the end of a recording."""
+        held, self._held = self._held, None
+        blocks = [] if held is None else self._push(held, self._held_arrival)
         block = self._close(-1, self._arrived) if self._block[0] >= 0 else None
-        return [] if block is None else [block]
+        return blocks if block is None else [*blocks, block]
 
     @property
     def counters(self) -> dict[str, int]:
@@ -118,6 +147,7 @@ class Assembler:
         rows, ranges = self._rows, self._rules.ranges
         self._amplitude = np.zeros((rows, ranges), np.uint8)
         self._cover = np.zeros(rows, np.int32)
+        self._converted = np.zeros(rows, np.bool_)
         self._key = np.zeros(rows, np.int64)
         self._time = np.zeros(rows)
         self._azimuth = np.zeros(rows)
@@ -126,8 +156,15 @@ class Assembler:
         start, end, gap = int(self._block[0]), int(self._block[1]), bool(self._block[3])
         azimuths, ranges = self._rules.azimuths, self._rules.ranges
         rows = end - start
-        whole = np.flatnonzero(self._cover[:rows] >= ranges)
-        short = int(np.count_nonzero(self._cover[:rows])) - len(whole)
+        cover = self._cover[:rows]
+        converted = self._converted[:rows]
+        # what was resampled may reach less far than the grid
+        reach = max(1, int(cover[converted].max(initial=0)))
+        wanted = np.where(converted, reach, ranges)
+        whole = np.flatnonzero(cover >= wanted)
+        short = int(np.count_nonzero(cover)) - len(whole)
+        if short and not gap:
+            self.refusals.note_short(int(cover[cover < wanted].max(initial=0)))
         self._counts[COUNTERS.index("incomplete" if gap else "wrong_cell_count")] += short
         self._counts[COUNTERS.index("sweeps")] += len(whole)
         scan = start // azimuths

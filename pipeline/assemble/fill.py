@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.assemble.order import LATE, MERGED, REORDERED, TAKEN, order
+from pipeline.assemble.fit import same_cells
+from pipeline.assemble.order import order
+from pipeline.assemble.resample import resampled
+from pipeline.assemble.state import LATE, MERGED, REORDERED, TAKEN
 from pipeline.kernels.compiled import allocating
 
 DONE, FILLED = 0, 1
@@ -17,22 +20,22 @@ merged; complete rows."""
 
 @allocating
 def order_and_fill(  # type: ignore[no-untyped-def]
-    fields, octets, arrival, rules, state, clock, seen, placed, times, at, row, edges, block, amplitude, cover, key,
-    time, azimuth, counts,
+    fields, octets, arrival, rules, state, clock, seen, placed, times, refused, at, row, edges, block, amplitude, cover,
+    converted, key, time, azimuth, counts,
 ):  # fmt: skip
     """`order` first when `at` is -1, then `fill`; one call, because each return waits for the interpreter's lock."""
     if at < 0:
-        order(fields, arrival, rules, state, clock, seen, counts, placed, times)
+        order(fields, arrival, rules, state, clock, seen, counts, placed, times, refused)
         at = 0
     return fill(
-        fields, octets, placed, times, at, row, rules.azimuths, rules.first_cell, edges, block, amplitude, cover, key,
-        time, azimuth, counts,
+        fields, octets, placed, times, at, row, rules, edges, block, amplitude, cover, converted, key, time, azimuth,
+        counts,
     )  # fmt: skip
 
 
 @allocating
 def fill(  # type: ignore[no-untyped-def]
-    fields, octets, placed, times, at, row, azimuths, first_cell, edges, block, amplitude, cover, key, time, azimuth,
+    fields, octets, placed, times, at, row, rules, edges, block, amplitude, cover, converted, key, time, azimuth,
     counts,
 ):  # fmt: skip
     """Go on with message `at` at absolute row `row` (-1: its first).
@@ -57,7 +60,7 @@ def fill(  # type: ignore[no-untyped-def]
                 row += 1
                 continue
             if block[START] < 0:
-                _open(row, azimuths, edges, block)
+                _open(row, rules.azimuths, edges, block)
             if row >= block[END]:
                 if placed[at, 3] == 1:
                     block[BLOCK_GAP] = 1
@@ -68,8 +71,8 @@ def fill(  # type: ignore[no-untyped-def]
                 counts[TAKEN] += 1
                 if late:
                     counts[REORDERED] += 1
-            _place(fields[at], octets, times[at], row, azimuths, first_cell, block, amplitude, cover, key, time,
-                   azimuth, counts)  # fmt: skip
+            _place(fields[at], octets, times[at], row, rules, block, amplitude, cover, converted, key, time, azimuth,
+                   counts)  # fmt: skip
             row += 1
             if block[WHOLE] == block[END] - block[START] and block[BLOCK_MERGED] == 0:
                 if row >= end:
@@ -92,12 +95,16 @@ def _open(row, azimuths, edges, block):  # type: ignore[no-untyped-def]
 
 @allocating
 def _place(  # type: ignore[no-untyped-def]
-    one, octets, moment, row, azimuths, first_cell, block, amplitude, cover, key, time, azimuth, counts
+    one, octets, moment, row, rules, block, amplitude, cover, converted, key, time, azimuth, counts
 ):
     at = row - block[START]
-    cells = one[5]
-    low = one[3] - first_cell
-    source = octets[one[8]][one[9] : one[9] + cells]
+    azimuths = rules.azimuths
+    low = one[3] - rules.first_cell
+    source = octets[one[8]][one[9] : one[9] + one[5]]
+    if rules.resample == 1 and not same_cells(one, rules.cell_fs):
+        low, source = resampled(one, source, rules)
+        converted[at] = True
+    cells = len(source)
     out = amplitude[at][low : low + cells]
     ranges = amplitude.shape[1]
     if cover[at] == 0:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipeline.asterix.cat240_batch import VideoBatch, decode_batch
-from pipeline.asterix.cat240_decode import DecodeError, SummaryMessage, VideoMessage, decode
+from pipeline.asterix.cat240_decode import DecodeError, SummaryMessage, VideoMessage, decode, read_datagram
 from pipeline.asterix.cat240_encode import MAX_DATAGRAM, encode_message, encode_summary, encode_sweeps
 
 __all__ = [
@@ -17,4 +17,5 @@ __all__ = [
     "encode_message",
     "encode_summary",
     "encode_sweeps",
+    "read_datagram",
 ]

@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.asterix.cat240_decode import LONGEST_DAY, DecodeError, SummaryMessage, VideoMessage, decode
+from pipeline.asterix.cat240_decode import LONGEST_DAY, SummaryMessage, VideoMessage, read_datagram
 from pipeline.kernels.compiled import allocating
 
 
@@ -46,6 +46,17 @@ class VideoBatch:
             )  # fmt: skip
         return cls(fields, octets)
 
+    def joined(self, other: VideoBatch) -> VideoBatch:
+        """The messages of this batch and then those of another, with octets of their own."""
+        fields = np.concatenate([self.fields, other.fields])
+        width = int((fields[:, OFFSET] + fields[:, CELLS]).max(initial=0))
+        octets = np.zeros((len(fields), width), np.uint8)
+        for i, one in enumerate((*self.fields, *other.fields)):
+            source = (self if i < len(self) else other).octets[one[ROW]]
+            octets[i, : one[OFFSET] + one[CELLS]] = source[: one[OFFSET] + one[CELLS]]
+        fields[:, ROW] = np.arange(len(fields))
+        return VideoBatch(fields, octets)
+
 
 MESSAGE, START, END, FIRST_CELL, DURATION, CELLS, TIME, SOURCE, ROW, OFFSET = range(10)
 """Columns of VideoBatch.fields: identification; azimuth counts; cells before the first; femtoseconds a cell; cells;
@@ -59,14 +70,17 @@ def decode_batch(
 ) -> list[tuple[VideoBatch, NDArray[np.int64] | slice]]:
     """The video messages of datagrams (n, width) uint8 of `lengths` (n,) int32 octets, in order.
 
-    Gives batches, each with the index (or slice) of the datagrams that its messages came from. Datagrams that cannot be
-    read are counted under the reason of their DecodeError, summary messages under "summary". The batches look into
-    `datagrams`: it must not change while they are in use.
+    Gives batches, each with the index (or slice) of the datagrams that its messages came from. What cannot be read is
+    counted under the reason of its DecodeError, summary messages under "summary". The batches look into `datagrams`: it
+    must not change while they are in use.
     """
     n = len(lengths)
     fields = np.empty((n, FIELDS), np.int64)
     good = np.empty(n, np.bool_)
-    if _scan(datagrams, lengths, fields, good) == n:
+    read, trailing = _scan(datagrams, lengths, fields, good)
+    if trailing:
+        counters["trailing"] = counters.get("trailing", 0) + trailing
+    if read == n:
         return [(VideoBatch(fields, datagrams), slice(0, n))] if n else []
     batches: list[tuple[VideoBatch, NDArray[np.int64] | slice]] = []
     edges = np.flatnonzero(np.diff(good)) + 1
@@ -84,11 +98,9 @@ def _slowly(
     messages: list[VideoMessage] = []
     origin: list[int] = []
     for i in rows:
-        try:
-            found = decode(datagrams[i, : lengths[i]].tobytes())
-        except DecodeError as error:
-            counters[error.reason] = counters.get(error.reason, 0) + 1
-            continue
+        found, faults = read_datagram(datagrams[i, : lengths[i]].tobytes())
+        for fault in faults:
+            counters[fault.reason] = counters.get(fault.reason, 0) + 1
         for one in found:
             if isinstance(one, SummaryMessage):
                 counters["summary"] = counters.get("summary", 0) + 1
@@ -101,10 +113,24 @@ def _slowly(
 @allocating
 def _scan(datagrams, lengths, fields, good):  # type: ignore[no-untyped-def]
     count = 0
+    trailing = 0
     for i in range(lengths.shape[0]):
-        good[i] = _read(datagrams[i], lengths[i], i, fields[i])
+        data, length = datagrams[i], lengths[i]
+        size = np.int64(data[1]) << 8 | data[2]
+        padded = size < length and _is_padding(data, size, length)
+        good[i] = _read(data, size if padded else length, i, fields[i])
         count += good[i]
-    return count
+        trailing += good[i] and padded
+    return count, trailing
+
+
+@allocating
+def _is_padding(data, at, length):  # type: ignore[no-untyped-def]
+    """The octets from `at` on are no block that `read_datagram` would tell of otherwise than as trailing."""
+    if length > data.shape[0] or length - at < 3:
+        return length <= data.shape[0]
+    size = np.int64(data[at + 1]) << 8 | data[at + 2]
+    return data[at] != 240 and (size < 3 or size > length - at)
 
 
 @allocating

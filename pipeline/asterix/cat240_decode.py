@@ -4,10 +4,15 @@ Source: EUROCONTROL-SPEC-0149-240 edition 1.3 as transcribed in asterix-specs `c
 read by the same rules; that has not been verified, neither against its text nor against a recording. The setting
 `udp.edition` of a radar therefore changes nothing in the reading: it notes what was agreed with the radar, since it is
 not on the wire. `cat240_batch` reads the common case much faster.
+
+Blocks carry their length, so those of other categories are passed over, and what stands behind the last block (padding
+to a fixed size) does no harm. Compressed video (C of I240/048) is read where it is zlib or gzip: the standard leaves
+the method to the users, and these are the ones met.
 """
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import dataclass
 from typing import Literal
 
@@ -21,11 +26,15 @@ MAX_CELLS = 65536
 LONGEST_DAY = 86401 * 128
 """Counts of 1/128 s in a day with a leap second: a clock that shows it says 23:59:60, time of day 86,400."""
 
-Reason = Literal["malformed", "wrong_category", "compressed"]
+REASONS = ("malformed", "wrong_category", "compressed", "trailing")
+"""Why a part of a datagram is left out: octets that break the rules; a block of another category; compressed in a way
+that is not known; octets behind the last block."""
+
+Reason = Literal["malformed", "wrong_category", "compressed", "trailing"]
 
 
 class DecodeError(ValueError):
-    """A datagram that cannot be read. reason: the counter it belongs to."""
+    """A datagram, or a part of one, that cannot be read. reason: one of REASONS, the counter it belongs to."""
 
     def __init__(self, reason: Reason, message: str) -> None:
         super().__init__(message)
@@ -64,6 +73,9 @@ class SummaryMessage:
     time_of_day: int | None
 
 
+_ZLIB_OR_GZIP = zlib.MAX_WBITS + 32
+"""The header of the stream says which of the two it is."""
+
 _FIXED = {1: 2, 2: 1, 3: 4, 5: 12, 6: 12, 7: 2, 8: 5, 12: 3}
 """FRN -> octets of the items of fixed length."""
 
@@ -77,40 +89,84 @@ _NAMES = {
 
 
 def decode(datagram: bytes) -> list[VideoMessage | SummaryMessage]:
-    """All messages of all data blocks of one datagram, in order.
+    """All messages of all data blocks of one datagram, in order; see `read_datagram` for what is left out.
 
-    Raises DecodeError: a block of another category, a length that does not fit, an item that is missing, unknown or cut
-    off, compressed video.
+    Raises DecodeError when there is none: a block of another category, a length that does not fit, an item that is
+    missing, unknown or cut off, video that is compressed in an unknown way.
     """
-    if not datagram:
-        raise DecodeError("malformed", "empty datagram")
-    found: list[VideoMessage | SummaryMessage] = []
-    at = 0
-    while at < len(datagram):
-        if len(datagram) - at < 3:
-            raise DecodeError("malformed", f"{len(datagram) - at} octets where a block header of 3 should be")
-        size = int.from_bytes(datagram[at + 1 : at + 3], "big")
-        if datagram[at] != CATEGORY:
-            raise DecodeError("wrong_category", f"category {datagram[at]}, not {CATEGORY}")
-        if size < 4 or at + size > len(datagram):
-            raise DecodeError("malformed", f"block of {size} octets in {len(datagram) - at}")
-        _block(datagram, at + 3, at + size, found)
-        at += size
+    found, faults = read_datagram(datagram)
+    if not found:
+        raise faults[0]
     return found
 
 
-def _block(data: bytes, at: int, end: int, found: list[VideoMessage | SummaryMessage]) -> None:
-    while at < end:
-        items, at = _items(data, at, end)
-        if 1 not in items or 2 not in items:
-            raise DecodeError("malformed", "a record without I240/010 or I240/000")
-        kind = items[2][0]
-        if kind == 1:
-            found.append(_summary(items))
-        elif kind == 2:
-            found.append(_video(items))
+def read_datagram(datagram: bytes) -> tuple[list[VideoMessage | SummaryMessage], list[DecodeError]]:
+    """(all messages of a datagram in order, what was left out of it); at least one of the two is not empty.
+
+    A record that cannot be read does not harm those before it; what is behind it in its block is left out with it, when
+    nothing says where the next one begins. Blocks of other categories and octets behind the last block are left out.
+    """
+    found: list[VideoMessage | SummaryMessage] = []
+    faults: list[DecodeError] = []
+    at = 0
+    while at < len(datagram):
+        size = int.from_bytes(datagram[at + 1 : at + 3], "big")
+        left = len(datagram) - at
+        ours = datagram[at] == CATEGORY
+        if left < 3 or not 3 <= size <= left:
+            faults.append(_no_block(datagram[at], size, left, bool(at) and not (ours and left >= 3)))
+            break
+        if ours:
+            _block(datagram, at + 3, at + size, found, faults)
         else:
-            raise DecodeError("malformed", f"message type {kind} is neither summary nor video")
+            faults.append(DecodeError("wrong_category", f"category {datagram[at]}, not {CATEGORY}"))
+        at += size
+    if not found and not faults:
+        faults.append(DecodeError("malformed", "empty datagram"))
+    return found, faults
+
+
+def _no_block(category: int, size: int, left: int, behind: bool) -> DecodeError:
+    """What to say of octets whose first are no block header. behind: a block stands before them."""
+    if behind:
+        return DecodeError("trailing", f"{left} octets behind the last block")
+    if left < 3:
+        return DecodeError("malformed", f"{left} octets where a block header of 3 should be")
+    if category != CATEGORY:
+        return DecodeError("wrong_category", f"category {category}, not {CATEGORY}")
+    return DecodeError("malformed", f"block of {size} octets in {left}")
+
+
+def _block(
+    data: bytes, at: int, end: int, found: list[VideoMessage | SummaryMessage], faults: list[DecodeError]
+) -> None:
+    if at == end:
+        faults.append(DecodeError("malformed", "a block without a record"))
+    begin = at
+    while at < end:
+        if at > begin and not any(data[at:end]):
+            faults.append(DecodeError("trailing", f"{end - at} octets 0 behind the last record of a block"))
+            return
+        try:
+            items, at = _items(data, at, end)
+        except DecodeError as error:
+            faults.append(error)
+            return  # where the next record begins is not known
+        try:
+            found.append(_message(items))
+        except DecodeError as error:
+            faults.append(error)
+
+
+def _message(items: dict[int, bytes]) -> VideoMessage | SummaryMessage:
+    if 1 not in items or 2 not in items:
+        raise DecodeError("malformed", "a record without I240/010 or I240/000")
+    kind = items[2][0]
+    if kind == 1:
+        return _summary(items)
+    if kind == 2:
+        return _video(items)
+    raise DecodeError("malformed", f"message type {kind} is neither summary nor video")
 
 
 def _items(data: bytes, at: int, end: int) -> tuple[dict[int, bytes], int]:
@@ -179,14 +235,15 @@ def _video(items: dict[int, bytes]) -> VideoMessage:
     duration = int.from_bytes(header[8:12], "big") * (1 if 6 in items else 1_000_000)
     if duration == 0:
         raise DecodeError("malformed", "cells of no duration")
-    if items[7][0] & 0x80:
-        raise DecodeError("compressed", "compressed video: how is a matter between users, it is not supported")
     resolution = items[7][1]
     if not 1 <= resolution <= 6:
         raise DecodeError("malformed", f"RES {resolution} of I240/048 is not defined")
     bits = 1 << (resolution - 1)
     octets = int.from_bytes(items[8][:2], "big")
     count = int.from_bytes(items[8][2:], "big")
+    if items[7][0] & 0x80 and 0 < count <= MAX_CELLS:
+        video = _expanded(video, (count * bits + 7) // 8)
+        octets = len(video)
     if not 0 < count <= MAX_CELLS or octets > len(video) or (count * bits + 7) // 8 > octets:
         raise DecodeError("malformed", f"{count} cells of {bits} bits, {octets} octets valid of {len(video)}")
     return VideoMessage(
@@ -201,6 +258,14 @@ def _video(items: dict[int, bytes]) -> VideoMessage:
         time_of_day=_time(items),
         cells=_to_octets(video, count, bits),
     )
+
+
+def _expanded(video: bytes, wanted: int) -> bytes:
+    """The first `wanted` octets of compressed video, or as many as there are. Where the stream ends it says itself."""
+    try:
+        return zlib.decompressobj(_ZLIB_OR_GZIP).decompress(video, wanted)
+    except zlib.error as error:
+        raise DecodeError("compressed", f"compressed video that is neither zlib nor gzip ({error})") from error
 
 
 def _to_octets(video: bytes, count: int, bits: int) -> NDArray[np.uint8]:

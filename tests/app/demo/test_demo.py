@@ -212,6 +212,7 @@ def test_video_command_records_scans_with_the_truth(tmp_path: Path) -> None:
     output = tmp_path / "video.npz"
     result = CliRunner().invoke(command_line, ["simulate", "video", "--seconds", "1", "--output", str(output)])
     assert result.exit_code == 0, result.output
+    assert "the detector learns for 12 turns" in " ".join(result.output.split())
     made = np.load(output)
     assert made["scans"].shape == (1, 4096, 1024)
     assert made["t"].tolist() == [1_700_000_000.0]

@@ -13,7 +13,7 @@ import pytest
 from app.ingest import socket_kernel
 from app.ingest.udp import VideoReceiver, warm
 from app.settings import RadarSettings, UdpSettings
-from pipeline.asterix.cat240 import encode_summary, encode_sweeps
+from pipeline.asterix.cat240 import encode_message, encode_summary, encode_sweeps
 from pipeline.sites import RadarSite
 from pipeline.tables import Sweeps, VideoFormat
 
@@ -95,10 +95,45 @@ def test_bad_datagrams_are_counted_and_the_rest_goes_on(receiving: str) -> None:
         out.sendto(encode_summary("a radar"), address)
         until(lambda: receiver.counters()["summary"] == 1 and receiver.counters()["sweeps"] == 64)
         counters = receiver.counters()
-    assert counters["truncated"] == 1
+    assert counters["truncated"] == 0
     assert counters["malformed"] == 4
-    assert counters["wrong_category"] == 3
+    assert counters["wrong_category"] == 4
     assert np.array_equal(np.concatenate([block.amplitude for block in got]), amplitude)
+
+
+def test_the_longest_datagrams_are_taken_whole(receiving: str) -> None:
+    """32-bit cells, and padding, make datagrams far longer than the cells of the grid ask for."""
+    cells = np.random.default_rng(3).integers(0, 256, (16, 16_000), dtype=np.uint8)
+    wide = cells.repeat(4, axis=1)
+    wide[:, 1::4] = wide[:, 2::4] = wide[:, 3::4] = 7
+    sent = [
+        encode_message(one.tobytes(), 16_000, message=i, start=4096 * i, end=(4096 * (i + 1)) % 65536, bits=32,
+                       cell_duration=20_013_846)
+        for i, one in enumerate(wide)
+    ]  # fmt: skip
+    sent = [one + bytes(65_507 - len(one)) for one in sent]
+    got: list[Sweeps] = []
+    with listening(16, 16_000, got.append) as (receiver, address), socket.socket(type=socket.SOCK_DGRAM) as out:
+        for i, one in enumerate(sent):
+            out.sendto(one, address)
+            until(lambda i=i: receiver.counters()["datagrams"] == i + 1)
+        until(lambda: receiver.counters()["sweeps"] == 16)
+        counters = receiver.counters()
+    assert (counters["truncated"], counters["trailing"]) == (0, 16)
+    assert np.array_equal(np.concatenate([block.amplitude for block in got]), cells)
+
+
+def test_what_does_not_fit_is_told(receiving: str, caplog: pytest.LogCaptureFixture) -> None:
+    _, sent = datagrams(64, 90, 1)
+    with listening(64, 102, print) as (receiver, address), socket.socket(type=socket.SOCK_DGRAM) as out:
+        assert receiver.refused.words() == ""
+        for one in sent:
+            out.sendto(one, address)
+        until(lambda: receiver.counters()["datagrams"] == 64 and receiver.refused.words() != "")
+    assert receiver.refused.words() == "refused: cells 90, settings say 102"
+    (record,) = [one for one in caplog.records if "refused" in one.getMessage()]
+    assert "radar smr" in record.getMessage()
+    assert "refused: cells 90, settings say 102" in record.getMessage()
 
 
 def test_a_delivery_that_fails_does_not_end_the_feed() -> None:
