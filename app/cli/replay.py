@@ -216,7 +216,6 @@ def _check(json: Path) -> None:
 
 
 def _describe(console: Console, recording: Recording) -> None:
-    from rich.markup import escape
 
     video = recording.site.video
     turns = "" if recording.scans is None else f"{recording.scans} turns, "

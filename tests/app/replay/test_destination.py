@@ -12,7 +12,7 @@ from app.ingest.recordings import open_recording
 from app.replay.destination import Destination, find_destination, source_to_send
 from app.settings import RadarSettings, Settings, SettingsError, UdpSettings
 from pipeline.asterix.cat240 import VideoMessage, decode
-from tests.app.ingest.test_captures import AZIMUTHS, RANGES, T0, VIDEO, capture, sent
+from tests.app.ingest.test_capture_sources import AZIMUTHS, RANGES, T0, VIDEO, capture, sent
 
 
 def radar(sac: int | None = None, sic: int | None = None, **words: object) -> Destination:
