@@ -10,7 +10,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from app.api.units import OCCURRENCES, unit_of
 from app.contract import Service
-from pipeline.assemble.order import COUNTERS
+from pipeline.assemble.state import COUNTERS
 from tests.support.running import Server, until
 from tests.support.service_rigs import RealRig
 
