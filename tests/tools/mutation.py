@@ -30,6 +30,7 @@ import tomllib
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -86,7 +87,13 @@ def main(words: Sequence[str] | None = None) -> int:
 def all_mutants(root: Path = ROOT) -> list[Mutant]:
     """Every mutation of ROOMS."""
     files = [path for room in ROOMS for path in sorted((root / "pipeline" / room).rglob("*.py"))]
-    return [one for path in files for one in mutants(path.relative_to(root).as_posix(), path.read_bytes())]
+    return [one for path in files for one in _mutants(path.relative_to(root).as_posix(), path.read_bytes())]
+
+
+@cache
+def _mutants(path: str, source: bytes) -> tuple[Mutant, ...]:
+    """Those of one file, found once: finding those of all rooms takes some fifteen seconds."""
+    return tuple(mutants(path, source))
 
 
 def equivalents(path: Path) -> dict[str, str]:
