@@ -6,8 +6,10 @@ import sys
 
 import typer
 
+from app.secret_urls import masked_text
+
 
 def fail(message: str, code: int = 2) -> typer.Exit:
     """Say what is wrong on standard error; use as `raise fail(...)`."""
-    print(f"airside: {message}", file=sys.stderr)
+    print(f"airside: {masked_text(message)}", file=sys.stderr)
     return typer.Exit(code)

@@ -23,6 +23,7 @@ from app.bus import connect_bus
 from app.contract import ReplayControl, Service
 from app.ingest.mqtt import MqttThread
 from app.live.hub import Hub
+from app.secret_urls import MaskedFormatter
 from app.service import SurfaceService
 from app.settings import Settings, SettingsError
 from app.store.store import Store
@@ -88,7 +89,7 @@ class Running:
             begin_view(view, service, step, self._ends)
             service.extra_counters["view3d"] = lambda: {f"view3d_{k}": v for k, v in view.counters().items()}
         try:
-            bus = connect_bus(self.settings.bus_url, service)
+            bus = connect_bus(self.settings.bus_url.get_secret_value(), service)
         except ValueError as error:
             raise SettingsError(f"bus_url: {error}") from error
         service.extra_counters["bus"] = bus.counters
@@ -96,7 +97,7 @@ class Running:
         step("sensors: opening the sockets")
         service.start()
         self._ends.callback(service.stop)
-        if self.settings.mqtt.url:
+        if self.settings.mqtt.url is not None and self.settings.mqtt.url.get_secret_value():
             mqtt = MqttThread(self.settings.mqtt, service)
             mqtt.start()
             service.extra_counters["mqtt"] = mqtt.counters
@@ -221,11 +222,8 @@ def _listen(settings: Settings) -> socket.socket:
 
 
 def _log_to(console: Console, level: str) -> None:
-    logging.basicConfig(
-        level=level.upper(),
-        format="%(message)s",
-        datefmt="%H:%M:%S",
-        handlers=[RichHandler(console=console, show_path=False)],
-    )
+    handler = RichHandler(console=console, show_path=False)
+    handler.setFormatter(MaskedFormatter("%(message)s", "%H:%M:%S"))
+    logging.basicConfig(level=level.upper(), handlers=[handler])
     for noisy in ("uvicorn.error", "uvicorn.access", "websockets", "alembic", "numba"):
         logging.getLogger(noisy).setLevel(logging.WARNING)

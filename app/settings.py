@@ -11,7 +11,9 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
+from pydantic_settings import SettingsError as SourceError
 
+from app.secret_urls import SecretUrl, check_url
 from pipeline.track.settings import LARGEST_CAPACITY
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -35,7 +37,7 @@ class SettingsError(ValueError):
 class Section(BaseModel):
     """A table of the settings file."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)
 
 
 class UdpSettings(Section):
@@ -230,8 +232,14 @@ class JournalSettings(Section):
 class MqttSettings(Section):
     """Pavement nodes that speak MQTT."""
 
-    url: str | None = None
+    url: SecretUrl | None = Field(None, description="mqtt://user:password@host:1883, or mqtts://...")
     topic: str = "airside/nodes/+/events"
+
+    @field_validator("url")
+    @classmethod
+    def _readable(cls, value: SecretUrl | None) -> SecretUrl | None:
+        check_url(value.get_secret_value() if value is not None else "")
+        return value
 
 
 class DemoSettings(Section):
@@ -253,7 +261,12 @@ class Settings(BaseSettings):
     """All settings. Top-level keys are also environment variables: AIRSIDE_PORT, AIRSIDE_DATABASE_URL, ..."""
 
     model_config = SettingsConfigDict(
-        env_prefix="AIRSIDE_", env_nested_delimiter="__", extra="forbid", frozen=True, populate_by_name=True
+        env_prefix="AIRSIDE_",
+        env_nested_delimiter="__",
+        extra="forbid",
+        frozen=True,
+        populate_by_name=True,
+        hide_input_in_errors=True,
     )
 
     mode: Literal["live", "demo", "replay"] = "live"
@@ -266,9 +279,11 @@ class Settings(BaseSettings):
     )
     airport: str = Field("LFPO", description="ICAO code of a shipped airport, or the path of an imported GeoJSON file")
     data_dir: Path = Path("data")
-    database_url: str = Field("", description="empty: SQLite in data_dir; postgresql+psycopg://... for a fleet")
-    bus_url: str = Field(
-        "memory://", description="memory:// or nats://host:port, where pictures and alerts are published"
+    database_url: SecretUrl = Field(
+        SecretUrl(""), description="empty: SQLite in data_dir; postgresql+psycopg://... for a fleet"
+    )
+    bus_url: SecretUrl = Field(
+        SecretUrl("memory://"), description="memory:// or nats://host:port, where pictures and alerts are published"
     )
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     allowed_origins: tuple[str, ...] = Field((), description="further origins that may open the feed and the 3D view")
@@ -296,10 +311,16 @@ class Settings(BaseSettings):
             raise ValueError(f"{path} begins like a path of the service itself")
         return path
 
+    @field_validator("bus_url")
+    @classmethod
+    def _readable(cls, value: SecretUrl) -> SecretUrl:
+        check_url(value.get_secret_value())
+        return value
+
     @property
     def database(self) -> str:
-        """The database URL, with the embedded default filled in."""
-        return self.database_url or f"sqlite:///{(self.data_dir / 'airside.sqlite3').resolve()}"
+        """The database URL, password and all, with the embedded default filled in."""
+        return self.database_url.get_secret_value() or f"sqlite:///{(self.data_dir / 'airside.sqlite3').resolve()}"
 
     @classmethod
     def settings_customise_sources(
@@ -332,7 +353,9 @@ def load(path: Path | None = None, **overrides: Any) -> Settings:
             made = made.model_copy(update=overrides)
             made = Settings.model_validate(made.model_dump())
     except ValidationError as error:
-        raise SettingsError("\n".join(_explain(one, str(path or "environment")) for one in error.errors())) from error
+        raise SettingsError("\n".join(_explain(one, str(path or "environment")) for one in error.errors())) from None
+    except SourceError as error:
+        raise SettingsError(f"environment: {error}") from None  # what it comes from holds the value
     return made
 
 
