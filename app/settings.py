@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import re
 import tomllib
@@ -14,6 +13,7 @@ from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, Settings
 from pydantic_settings import SettingsError as SourceError
 
 from app.secret_urls import SecretUrl, check_url
+from app.settings_faults import explain, nearest
 from pipeline.track.settings import LARGEST_CAPACITY
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -25,6 +25,9 @@ NOT_SETTINGS = frozenset({"AIRSIDE_SETTINGS", "AIRSIDE_REQUIRE_SERVICES"})
 
 PLAIN_PATH = re.compile(r"(/[A-Za-z0-9._~-]+)+")
 """A path that is safe to put in front of a link: never "//host"."""
+
+HOST_NAME = re.compile(r"\*|(\*\.)?[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*|[0-9A-Fa-f:]+")
+"""A host as the allow-list takes it: a name, a name behind "*.", an address, or "*"."""
 
 OWN_PATHS = frozenset({"api", "data", "chunks", "health", "metrics", "3d", "docs", "css", "js"})
 """First parts of the paths of the service: below one of these, a path with and without `root_path` look alike."""
@@ -286,6 +289,11 @@ class Settings(BaseSettings):
         SecretUrl("memory://"), description="memory:// or nats://host:port, where pictures and alerts are published"
     )
     log_level: Literal["debug", "info", "warning", "error"] = "info"
+    allowed_hosts: tuple[str, ...] = Field(
+        (),
+        description="further names under which clients ask for this service, such as the one that a proxy passes on, "
+        '"*.tower.example", or "*" for any; the loopback names and `host` are always allowed',
+    )
     allowed_origins: tuple[str, ...] = Field((), description="further origins that may open the feed and the 3D view")
     view3d: bool = True
     radars: tuple[RadarSettings, ...] = ()
@@ -315,6 +323,14 @@ class Settings(BaseSettings):
     @classmethod
     def _readable(cls, value: SecretUrl) -> SecretUrl:
         check_url(value.get_secret_value())
+        return value
+
+    @field_validator("allowed_hosts")
+    @classmethod
+    def _names(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        for name in value:
+            if not HOST_NAME.fullmatch(name):
+                raise ValueError('names or addresses without scheme and port, such as "radar.tower.example"')
         return value
 
     @property
@@ -353,7 +369,9 @@ def load(path: Path | None = None, **overrides: Any) -> Settings:
             made = made.model_copy(update=overrides)
             made = Settings.model_validate(made.model_dump())
     except ValidationError as error:
-        raise SettingsError("\n".join(_explain(one, str(path or "environment")) for one in error.errors())) from None
+        raise SettingsError(
+            "\n".join(explain(one, str(path or "environment"), Settings) for one in error.errors())
+        ) from None
     except SourceError as error:
         raise SettingsError(f"environment: {error}") from None  # what it comes from holds the value
     return made
@@ -366,35 +384,4 @@ def _refuse_unknown_environment() -> None:
         key = name.removeprefix("AIRSIDE_").split("__")[0].lower()
         if key not in Settings.model_fields:
             known = [f"AIRSIDE_{field.upper()}" for field in Settings.model_fields]
-            raise SettingsError(f"environment: {name} is not a setting{_nearest(name, known)}")
-
-
-def _explain(fault: Any, where: str) -> str:
-    place = ".".join(str(one) for one in fault["loc"])
-    if fault["type"] == "extra_forbidden":
-        return f"{where}: {place} is not a setting{_nearest(str(fault['loc'][-1]), _known_keys(fault['loc'][:-1]))}"
-    return f"{where}: {place}: {fault['msg']}"
-
-
-def _known_keys(loc: tuple[Any, ...]) -> list[str]:
-    model: Any = Settings
-    for step in loc:
-        if isinstance(step, int) or not hasattr(model, "model_fields") or step not in model.model_fields:
-            continue
-        model = _model_in(model.model_fields[step].annotation)
-    return list(getattr(model, "model_fields", {}))
-
-
-def _model_in(annotation: Any) -> Any:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for one in getattr(annotation, "__args__", ()):
-        found = _model_in(one)
-        if found is not None:
-            return found
-    return None
-
-
-def _nearest(word: str, among: list[str]) -> str:
-    close = difflib.get_close_matches(word, among, n=1, cutoff=0.5)
-    return f"; did you mean {close[0]}?" if close else ""
+            raise SettingsError(f"environment: {name} is not a setting{nearest(name, known)}")
