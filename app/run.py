@@ -20,9 +20,11 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from app.airports import load_airport
 from app.api.application import create_app
 from app.bus import connect_bus
+from app.console import one_line
 from app.contract import ReplayControl, Service
 from app.ingest.mqtt import MqttThread
 from app.live.hub import Hub
+from app.private_files import make_private_folder
 from app.secret_urls import MaskedFormatter
 from app.service import SurfaceService
 from app.settings import Settings, SettingsError
@@ -56,7 +58,7 @@ class Running:
     """A service with its store, feeds and server. `begin` is run in a thread while the server already answers."""
 
     def __init__(self, settings: Settings) -> None:
-        settings.data_dir.mkdir(parents=True, exist_ok=True)
+        make_private_folder(settings.data_dir, "data_dir")
         self.settings = settings
         airport, document = load_airport(settings.airport)
         self.service = SurfaceService(settings, airport, document)
@@ -165,7 +167,7 @@ def serve(settings: Settings, console: Console, running: Served | None = None) -
             _begin_aloud(running, console, server, listening.getsockname()[1])
         except BaseException as error:
             failed.append(error)
-            log.error("start-up failed: %s", error, exc_info=settings.log_level == "debug")
+            log.error("start-up failed: %s", one_line(error), exc_info=settings.log_level == "debug")
             server.should_exit = True
 
     # uvicorn raises the signal that ended it once more, which would end us before the store has drained
@@ -183,7 +185,7 @@ def serve(settings: Settings, console: Console, running: Served | None = None) -
 
 def _begin_aloud(running: Served, console: Console, server: uvicorn.Server, port: int) -> None:
     begun = time.monotonic()
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    columns = (SpinnerColumn("line"), TextColumn("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=not console.is_terminal) as progress:
         tasks: list[Any] = []
 

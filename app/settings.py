@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 import tomllib
@@ -9,19 +10,18 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
-from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
+from pydantic_settings import BaseSettings, EnvSettingsSource, PydanticBaseSettingsSource, SettingsConfigDict
 from pydantic_settings import SettingsError as SourceError
 
 from app.secret_urls import SecretUrl, check_url
-from app.settings_faults import explain, nearest
+from app.settings_environment import BETWEEN, PREFIX, strays
+from app.settings_faults import explain
 from pipeline.track.settings import LARGEST_CAPACITY
+
+log = logging.getLogger(__name__)
 
 ROOT = Path(__file__).resolve().parent.parent
 """The checkout or the image: where `static`, `migrations` and `app` lie."""
-
-NOT_SETTINGS = frozenset({"AIRSIDE_SETTINGS", "AIRSIDE_REQUIRE_SERVICES"})
-"""Environment variables of this prefix that are not settings."""
-
 
 PLAIN_PATH = re.compile(r"(/[A-Za-z0-9._~-]+)+")
 """A path that is safe to put in front of a link: never "//host"."""
@@ -264,8 +264,8 @@ class Settings(BaseSettings):
     """All settings. Top-level keys are also environment variables: AIRSIDE_PORT, AIRSIDE_DATABASE_URL, ..."""
 
     model_config = SettingsConfigDict(
-        env_prefix="AIRSIDE_",
-        env_nested_delimiter="__",
+        env_prefix=PREFIX,
+        env_nested_delimiter=BETWEEN,
         extra="forbid",
         frozen=True,
         populate_by_name=True,
@@ -280,7 +280,9 @@ class Settings(BaseSettings):
         description='path under which a proxy serves all of it, such as "/airside"; without it the X-Forwarded-Prefix '
         "of the proxy holds",
     )
-    airport: str = Field("LFPO", description="ICAO code of a shipped airport, or the path of an imported GeoJSON file")
+    airport: str = Field(
+        "LFPO", description="ICAO code of a shipped airport, or the path of an imported GeoJSON file, from this file on"
+    )
     data_dir: Path = Path("data")
     database_url: SecretUrl = Field(
         SecretUrl(""), description="empty: SQLite in data_dir; postgresql+psycopg://... for a fleet"
@@ -347,22 +349,28 @@ class Settings(BaseSettings):
         dotenv_settings: PydanticBaseSettingsSource,
         file_secret_settings: PydanticBaseSettingsSource,
     ) -> tuple[PydanticBaseSettingsSource, ...]:
-        """The environment goes over the file (the file comes in through init)."""
+        """The environment, as far as it is settings, goes over the file (the file comes in through init)."""
+        if isinstance(env_settings, EnvSettingsSource):
+            left_out = strays(env_settings.env_vars, cls)
+            env_settings.env_vars = {k: v for k, v in env_settings.env_vars.items() if k not in left_out}
         return env_settings, init_settings
 
 
 def load(path: Path | None = None, **overrides: Any) -> Settings:
     """Read the file (or none), put the environment on top, and `overrides` (from the command line) on top of all.
 
-    Raises SettingsError with one line a fault.
+    A path of an airport in the file is relative to the file. Variables of the prefix that are no settings are warned
+    of. Raises SettingsError with one line a fault.
     """
     values: dict[str, Any] = {}
     if path is not None:
         try:
-            values = tomllib.loads(path.read_text())
+            values = tomllib.loads(path.read_text(encoding="utf-8"))
+            values.update(_beside(path, values.get("airport")))
         except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise SettingsError(f"{path}: {error}") from error
-    _refuse_unknown_environment()
+    for name, why in strays(os.environ, Settings).items():
+        log.warning("environment: %s %s; it is left out", name, why)
     try:
         made = Settings(**values)
         if overrides:
@@ -377,11 +385,10 @@ def load(path: Path | None = None, **overrides: Any) -> Settings:
     return made
 
 
-def _refuse_unknown_environment() -> None:
-    for name in os.environ:
-        if not name.startswith("AIRSIDE_") or name in NOT_SETTINGS:
-            continue
-        key = name.removeprefix("AIRSIDE_").split("__")[0].lower()
-        if key not in Settings.model_fields:
-            known = [f"AIRSIDE_{field.upper()}" for field in Settings.model_fields]
-            raise SettingsError(f"environment: {name} is not a setting{nearest(name, known)}")
+def _beside(path: Path, airport: Any) -> dict[str, str]:
+    """The airport of a settings file, where that is a path and not the code of a shipped one."""
+    if not isinstance(airport, str):
+        return {}
+    beside = path.absolute().parent / Path(airport).expanduser()
+    is_path = Path(airport).suffix.lower() in (".geojson", ".json") or "/" in airport or beside.is_file()
+    return {"airport": str(beside)} if is_path else {}

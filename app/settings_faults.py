@@ -29,15 +29,16 @@ def _known_keys(whole: type[BaseModel], loc: tuple[Any, ...]) -> list[str]:
     for step in loc:
         if isinstance(step, int) or not hasattr(model, "model_fields") or step not in model.model_fields:
             continue
-        model = _model_in(model.model_fields[step].annotation)
+        model = model_in(model.model_fields[step].annotation)
     return list(getattr(model, "model_fields", {}))
 
 
-def _model_in(annotation: Any) -> Any:
+def model_in(annotation: Any) -> Any:
+    """The table of settings in a type annotation; None when there is none."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     for one in getattr(annotation, "__args__", ()):
-        found = _model_in(one)
+        found = model_in(one)
         if found is not None:
             return found
     return None
