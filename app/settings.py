@@ -46,7 +46,9 @@ class Section(BaseModel):
 class UdpSettings(Section):
     """Where a radar's CAT240 datagrams arrive."""
 
-    address: str = Field("0.0.0.0", description="local address to listen on")
+    address: str | None = Field(
+        None, description="local address to listen on; without it udp_address, or every address where a group is joined"
+    )
     port: int = Field(8600, ge=0, le=65535, description="UDP port; 0 lets the system choose")
     group: str | None = Field(None, description="multicast group to join")
     interface: str = Field("0.0.0.0", description="address of the interface on which the group is joined")
@@ -290,6 +292,7 @@ class Settings(BaseSettings):
     bus_url: SecretUrl = Field(
         SecretUrl("memory://"), description="memory:// or nats://host:port, where pictures and alerts are published"
     )
+    udp_address: str = Field("127.0.0.1", description="where radars without an address of their own are heard")
     log_level: Literal["debug", "info", "warning", "error"] = "info"
     allowed_hosts: tuple[str, ...] = Field(
         (),

@@ -10,6 +10,7 @@ from sqlalchemy import Engine, create_engine, event
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError
 
+from app.private_files import FOLDER_MODE, make_private_file
 from app.settings import ROOT, SettingsError
 
 MIGRATIONS = ROOT / "migrations"
@@ -31,11 +32,12 @@ def open_engine(url: str) -> Engine:
         try:
             return create_engine(parsed, pool_pre_ping=True, connect_args=PATIENCE)
         except (ArgumentError, ImportError):
-            raise SettingsError(
-                f"database_url: {parsed.drivername} is no known kind of database"
-            ) from None
+            raise SettingsError(f"database_url: {parsed.drivername} is no known kind of database") from None
     if parsed.database and parsed.database != ":memory:":
-        Path(parsed.database).parent.mkdir(parents=True, exist_ok=True)
+        file = Path(parsed.database)
+        file.parent.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
+        if not parsed.database.startswith("file:"):
+            make_private_file(file)  # the files of the write-ahead log take its mode
     engine = create_engine(parsed)
     event.listen(engine, "connect", _prepare_sqlite)
     return engine
