@@ -21,7 +21,7 @@ RUN AIRSIDE_DATA_DIR=/tmp/airside /opt/airside/bin/airside warmup && rm -rf /tmp
 
 FROM ${BASE}
 RUN useradd --system --uid 10001 --home-dir /data --shell /usr/sbin/nologin airside \
- && mkdir -p /data /var/cache/airside && chown airside:airside /data /var/cache/airside
+ && mkdir -p /data /var/cache/airside && chown airside:airside /data /var/cache/airside && chmod 700 /data
 COPY --from=builder /opt/airside /opt/airside
 COPY --from=builder /srv/airside /srv/airside
 COPY --from=builder --chown=airside:airside /var/cache/airside /var/cache/airside
@@ -30,6 +30,7 @@ ENV PATH=/opt/airside/bin:$PATH \
     PYTHONDONTWRITEBYTECODE=1 \
     NUMBA_CACHE_DIR=/var/cache/airside \
     AIRSIDE_HOST=0.0.0.0 \
+    AIRSIDE_UDP_ADDRESS=0.0.0.0 \
     AIRSIDE_DATA_DIR=/data
 WORKDIR /srv/airside
 USER airside

@@ -60,6 +60,13 @@ def node_site(node: NodeSettings, airport: Airport) -> NodeSite:
     )
 
 
+def radar_heard_at(radar: RadarSettings, address: str) -> RadarSettings:
+    """A radar whose datagrams are awaited at this address where it names neither an address nor a group."""
+    if radar.udp is None or radar.udp.address or radar.udp.group:
+        return radar
+    return radar.model_copy(update={"udp": radar.udp.model_copy(update={"address": address})})
+
+
 AHEAD_MARGIN_S = 1.0
 """The engine refuses what is dated this much further ahead than the clock settings allow: a second line of defence."""
 

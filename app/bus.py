@@ -16,6 +16,7 @@ from typing import Any, Protocol
 from urllib.parse import urlsplit
 
 from app.contract import Service
+from app.secret_urls import masked_text
 from app.wire import Wire, encode
 from pipeline.picture import AlertChange, Picture
 
@@ -52,7 +53,8 @@ class NatsBus:
     """`nats://host:port`: publishes from a thread of its own, so that a slow server delays nothing."""
 
     def __init__(self, url: str, service: Service) -> None:
-        self.url = url
+        self._url = url
+        self.shown = masked_text(url)
         self.icao = service.airport.icao
         self._wire = Wire(service.airport, service.settings.mode)
         self._epoch = secrets.token_hex(4)
@@ -101,7 +103,7 @@ class NatsBus:
 
         # The client tries for ever by itself; only the end of the service ends that.
         connecting = asyncio.create_task(
-            nats.connect(self.url, max_reconnect_attempts=-1, reconnect_time_wait=RETRY_S, error_cb=self._complain)
+            nats.connect(self._url, max_reconnect_attempts=-1, reconnect_time_wait=RETRY_S, error_cb=self._complain)
         )
         closing = asyncio.create_task(self._closing.wait())
         await asyncio.wait((connecting, closing), return_when=asyncio.FIRST_COMPLETED)
@@ -126,7 +128,7 @@ class NatsBus:
 
     async def _complain(self, error: Exception) -> None:
         self._counts["retries"] += 1
-        log.warning("bus %s: %s", self.url, error or type(error).__name__)
+        log.warning("bus %s: %s", self.shown, error or type(error).__name__)
 
     async def _pause(self, seconds: float) -> bool:
         try:
@@ -146,7 +148,7 @@ class NatsBus:
             await stream.add_stream(config)
         except (Error, OSError) as error:
             self._counts["retries"] += 1
-            log.warning("bus %s: stream for alerts: %s", self.url, error)
+            log.warning("bus %s: stream for alerts: %s", self.shown, error)
             return False
         return True
 
@@ -162,7 +164,7 @@ class NatsBus:
             await client.publish(f"airside.{self.icao}.picture", encode(self._wire.picture(picture, self._epoch, seq)))
         except Error as error:
             self._counts["retries"] += 1
-            log.warning("bus %s: %s", self.url, error)
+            log.warning("bus %s: %s", self.shown, error)
         else:
             self._counts["pictures"] += 1
 
@@ -178,7 +180,7 @@ class NatsBus:
                 await stream.publish(f"airside.{self.icao}.alert", text, headers=number)
             except (Error, OSError) as error:
                 self._counts["retries"] += 1
-                log.warning("bus %s: alert not taken yet: %s", self.url, error)
+                log.warning("bus %s: alert not taken yet: %s", self.shown, error)
                 return
             self._alerts.popleft()
             self._counts["alerts"] += 1
@@ -191,4 +193,4 @@ def connect_bus(url: str, service: Service) -> Bus:
         return MemoryBus()
     if scheme in ("nats", "tls"):
         return NatsBus(url, service)
-    raise ValueError(f"bus_url: {scheme or url!r} is no kind of bus; there are memory:// and nats://")
+    raise ValueError(f"{scheme or 'a URL without a scheme'} is no kind of bus; there are memory:// and nats://")

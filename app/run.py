@@ -20,9 +20,12 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from app.airports import load_airport
 from app.api.application import create_app
 from app.bus import connect_bus
+from app.console import one_line
 from app.contract import ReplayControl, Service
 from app.ingest.mqtt import MqttThread
 from app.live.hub import Hub
+from app.private_files import make_private_folder
+from app.secret_urls import MaskedFormatter
 from app.service import SurfaceService
 from app.settings import Settings, SettingsError
 from app.store.store import Store
@@ -55,7 +58,7 @@ class Running:
     """A service with its store, feeds and server. `begin` is run in a thread while the server already answers."""
 
     def __init__(self, settings: Settings) -> None:
-        settings.data_dir.mkdir(parents=True, exist_ok=True)
+        make_private_folder(settings.data_dir, "data_dir")
         self.settings = settings
         airport, document = load_airport(settings.airport)
         self.service = SurfaceService(settings, airport, document)
@@ -88,7 +91,7 @@ class Running:
             begin_view(view, service, step, self._ends)
             service.extra_counters["view3d"] = lambda: {f"view3d_{k}": v for k, v in view.counters().items()}
         try:
-            bus = connect_bus(self.settings.bus_url, service)
+            bus = connect_bus(self.settings.bus_url.get_secret_value(), service)
         except ValueError as error:
             raise SettingsError(f"bus_url: {error}") from error
         service.extra_counters["bus"] = bus.counters
@@ -96,7 +99,7 @@ class Running:
         step("sensors: opening the sockets")
         service.start()
         self._ends.callback(service.stop)
-        if self.settings.mqtt.url:
+        if self.settings.mqtt.url is not None and self.settings.mqtt.url.get_secret_value():
             mqtt = MqttThread(self.settings.mqtt, service)
             mqtt.start()
             service.extra_counters["mqtt"] = mqtt.counters
@@ -164,7 +167,7 @@ def serve(settings: Settings, console: Console, running: Served | None = None) -
             _begin_aloud(running, console, server, listening.getsockname()[1])
         except BaseException as error:
             failed.append(error)
-            log.error("start-up failed: %s", error, exc_info=settings.log_level == "debug")
+            log.error("start-up failed: %s", one_line(error), exc_info=settings.log_level == "debug")
             server.should_exit = True
 
     # uvicorn raises the signal that ended it once more, which would end us before the store has drained
@@ -182,7 +185,7 @@ def serve(settings: Settings, console: Console, running: Served | None = None) -
 
 def _begin_aloud(running: Served, console: Console, server: uvicorn.Server, port: int) -> None:
     begun = time.monotonic()
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    columns = (SpinnerColumn("line"), TextColumn("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=not console.is_terminal) as progress:
         tasks: list[Any] = []
 
@@ -221,11 +224,8 @@ def _listen(settings: Settings) -> socket.socket:
 
 
 def _log_to(console: Console, level: str) -> None:
-    logging.basicConfig(
-        level=level.upper(),
-        format="%(message)s",
-        datefmt="%H:%M:%S",
-        handlers=[RichHandler(console=console, show_path=False)],
-    )
+    handler = RichHandler(console=console, show_path=False)
+    handler.setFormatter(MaskedFormatter("%(message)s", "%H:%M:%S"))
+    logging.basicConfig(level=level.upper(), handlers=[handler])
     for noisy in ("uvicorn.error", "uvicorn.access", "websockets", "alembic", "numba"):
         logging.getLogger(noisy).setLevel(logging.WARNING)

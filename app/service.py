@@ -10,7 +10,16 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
 
-from app.assembly import FRONT_END, build_parts, chain_of, check_parts, node_site, radar_site, surface_engine
+from app.assembly import (
+    FRONT_END,
+    build_parts,
+    chain_of,
+    check_parts,
+    node_site,
+    radar_heard_at,
+    radar_site,
+    surface_engine,
+)
 from app.contract import (
     FrontEnd,
     PictureListener,
@@ -130,7 +139,9 @@ class SurfaceService:
             self._workers[site.id] = worker
             if radar.udp is not None:
                 deliver = self._taker(worker)
-                self._receivers[site.id] = VideoReceiver(site, index, radar, deliver, self.clock)
+                self._receivers[site.id] = VideoReceiver(
+                    site, index, radar_heard_at(radar, self.settings.udp_address), deliver, self.clock
+                )
         self.checks["warm"] = True
 
     def start(self) -> None:

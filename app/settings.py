@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import difflib
+import logging
 import os
 import re
 import tomllib
@@ -10,19 +10,24 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
-from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
+from pydantic_settings import BaseSettings, EnvSettingsSource, PydanticBaseSettingsSource, SettingsConfigDict
+from pydantic_settings import SettingsError as SourceError
 
+from app.secret_urls import SecretUrl, check_url
+from app.settings_environment import BETWEEN, PREFIX, strays
+from app.settings_faults import explain
 from pipeline.track.settings import LARGEST_CAPACITY
+
+log = logging.getLogger(__name__)
 
 ROOT = Path(__file__).resolve().parent.parent
 """The checkout or the image: where `static`, `migrations` and `app` lie."""
 
-NOT_SETTINGS = frozenset({"AIRSIDE_SETTINGS", "AIRSIDE_REQUIRE_SERVICES"})
-"""Environment variables of this prefix that are not settings."""
-
-
 PLAIN_PATH = re.compile(r"(/[A-Za-z0-9._~-]+)+")
 """A path that is safe to put in front of a link: never "//host"."""
+
+HOST_NAME = re.compile(r"\*|(\*\.)?[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*|[0-9A-Fa-f:]+")
+"""A host as the allow-list takes it: a name, a name behind "*.", an address, or "*"."""
 
 OWN_PATHS = frozenset({"api", "data", "chunks", "health", "metrics", "3d", "docs", "css", "js"})
 """First parts of the paths of the service: below one of these, a path with and without `root_path` look alike."""
@@ -35,13 +40,15 @@ class SettingsError(ValueError):
 class Section(BaseModel):
     """A table of the settings file."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)
 
 
 class UdpSettings(Section):
     """Where a radar's CAT240 datagrams arrive."""
 
-    address: str = Field("0.0.0.0", description="local address to listen on")
+    address: str | None = Field(
+        None, description="local address to listen on; without it udp_address, or every address where a group is joined"
+    )
     port: int = Field(8600, ge=0, le=65535, description="UDP port; 0 lets the system choose")
     group: str | None = Field(None, description="multicast group to join")
     interface: str = Field("0.0.0.0", description="address of the interface on which the group is joined")
@@ -230,8 +237,14 @@ class JournalSettings(Section):
 class MqttSettings(Section):
     """Pavement nodes that speak MQTT."""
 
-    url: str | None = None
+    url: SecretUrl | None = Field(None, description="mqtt://user:password@host:1883, or mqtts://...")
     topic: str = "airside/nodes/+/events"
+
+    @field_validator("url")
+    @classmethod
+    def _readable(cls, value: SecretUrl | None) -> SecretUrl | None:
+        check_url(value.get_secret_value() if value is not None else "")
+        return value
 
 
 class DemoSettings(Section):
@@ -253,7 +266,12 @@ class Settings(BaseSettings):
     """All settings. Top-level keys are also environment variables: AIRSIDE_PORT, AIRSIDE_DATABASE_URL, ..."""
 
     model_config = SettingsConfigDict(
-        env_prefix="AIRSIDE_", env_nested_delimiter="__", extra="forbid", frozen=True, populate_by_name=True
+        env_prefix=PREFIX,
+        env_nested_delimiter=BETWEEN,
+        extra="forbid",
+        frozen=True,
+        populate_by_name=True,
+        hide_input_in_errors=True,
     )
 
     mode: Literal["live", "demo", "replay"] = "live"
@@ -264,13 +282,23 @@ class Settings(BaseSettings):
         description='path under which a proxy serves all of it, such as "/airside"; without it the X-Forwarded-Prefix '
         "of the proxy holds",
     )
-    airport: str = Field("LFPO", description="ICAO code of a shipped airport, or the path of an imported GeoJSON file")
-    data_dir: Path = Path("data")
-    database_url: str = Field("", description="empty: SQLite in data_dir; postgresql+psycopg://... for a fleet")
-    bus_url: str = Field(
-        "memory://", description="memory:// or nats://host:port, where pictures and alerts are published"
+    airport: str = Field(
+        "LFPO", description="ICAO code of a shipped airport, or the path of an imported GeoJSON file, from this file on"
     )
+    data_dir: Path = Path("data")
+    database_url: SecretUrl = Field(
+        SecretUrl(""), description="empty: SQLite in data_dir; postgresql+psycopg://... for a fleet"
+    )
+    bus_url: SecretUrl = Field(
+        SecretUrl("memory://"), description="memory:// or nats://host:port, where pictures and alerts are published"
+    )
+    udp_address: str = Field("127.0.0.1", description="where radars without an address of their own are heard")
     log_level: Literal["debug", "info", "warning", "error"] = "info"
+    allowed_hosts: tuple[str, ...] = Field(
+        (),
+        description="further names under which clients ask for this service, such as the one that a proxy passes on, "
+        '"*.tower.example", or "*" for any; the loopback names and `host` are always allowed',
+    )
     allowed_origins: tuple[str, ...] = Field((), description="further origins that may open the feed and the 3D view")
     view3d: bool = True
     radars: tuple[RadarSettings, ...] = ()
@@ -296,10 +324,24 @@ class Settings(BaseSettings):
             raise ValueError(f"{path} begins like a path of the service itself")
         return path
 
+    @field_validator("bus_url")
+    @classmethod
+    def _readable(cls, value: SecretUrl) -> SecretUrl:
+        check_url(value.get_secret_value())
+        return value
+
+    @field_validator("allowed_hosts")
+    @classmethod
+    def _names(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        for name in value:
+            if not HOST_NAME.fullmatch(name):
+                raise ValueError('names or addresses without scheme and port, such as "radar.tower.example"')
+        return value
+
     @property
     def database(self) -> str:
-        """The database URL, with the embedded default filled in."""
-        return self.database_url or f"sqlite:///{(self.data_dir / 'airside.sqlite3').resolve()}"
+        """The database URL, password and all, with the embedded default filled in."""
+        return self.database_url.get_secret_value() or f"sqlite:///{(self.data_dir / 'airside.sqlite3').resolve()}"
 
     @classmethod
     def settings_customise_sources(
@@ -310,68 +352,46 @@ class Settings(BaseSettings):
         dotenv_settings: PydanticBaseSettingsSource,
         file_secret_settings: PydanticBaseSettingsSource,
     ) -> tuple[PydanticBaseSettingsSource, ...]:
-        """The environment goes over the file (the file comes in through init)."""
+        """The environment, as far as it is settings, goes over the file (the file comes in through init)."""
+        if isinstance(env_settings, EnvSettingsSource):
+            left_out = strays(env_settings.env_vars, cls)
+            env_settings.env_vars = {k: v for k, v in env_settings.env_vars.items() if k not in left_out}
         return env_settings, init_settings
 
 
 def load(path: Path | None = None, **overrides: Any) -> Settings:
     """Read the file (or none), put the environment on top, and `overrides` (from the command line) on top of all.
 
-    Raises SettingsError with one line a fault.
+    A path of an airport in the file is relative to the file. Variables of the prefix that are no settings are warned
+    of. Raises SettingsError with one line a fault.
     """
     values: dict[str, Any] = {}
     if path is not None:
         try:
-            values = tomllib.loads(path.read_text())
+            values = tomllib.loads(path.read_text(encoding="utf-8"))
+            values.update(_beside(path, values.get("airport")))
         except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise SettingsError(f"{path}: {error}") from error
-    _refuse_unknown_environment()
+    for name, why in strays(os.environ, Settings).items():
+        log.warning("environment: %s %s; it is left out", name, why)
     try:
         made = Settings(**values)
         if overrides:
             made = made.model_copy(update=overrides)
             made = Settings.model_validate(made.model_dump())
     except ValidationError as error:
-        raise SettingsError("\n".join(_explain(one, str(path or "environment")) for one in error.errors())) from error
+        raise SettingsError(
+            "\n".join(explain(one, str(path or "environment"), Settings) for one in error.errors())
+        ) from None
+    except SourceError as error:
+        raise SettingsError(f"environment: {error}") from None  # what it comes from holds the value
     return made
 
 
-def _refuse_unknown_environment() -> None:
-    for name in os.environ:
-        if not name.startswith("AIRSIDE_") or name in NOT_SETTINGS:
-            continue
-        key = name.removeprefix("AIRSIDE_").split("__")[0].lower()
-        if key not in Settings.model_fields:
-            known = [f"AIRSIDE_{field.upper()}" for field in Settings.model_fields]
-            raise SettingsError(f"environment: {name} is not a setting{_nearest(name, known)}")
-
-
-def _explain(fault: Any, where: str) -> str:
-    place = ".".join(str(one) for one in fault["loc"])
-    if fault["type"] == "extra_forbidden":
-        return f"{where}: {place} is not a setting{_nearest(str(fault['loc'][-1]), _known_keys(fault['loc'][:-1]))}"
-    return f"{where}: {place}: {fault['msg']}"
-
-
-def _known_keys(loc: tuple[Any, ...]) -> list[str]:
-    model: Any = Settings
-    for step in loc:
-        if isinstance(step, int) or not hasattr(model, "model_fields") or step not in model.model_fields:
-            continue
-        model = _model_in(model.model_fields[step].annotation)
-    return list(getattr(model, "model_fields", {}))
-
-
-def _model_in(annotation: Any) -> Any:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for one in getattr(annotation, "__args__", ()):
-        found = _model_in(one)
-        if found is not None:
-            return found
-    return None
-
-
-def _nearest(word: str, among: list[str]) -> str:
-    close = difflib.get_close_matches(word, among, n=1, cutoff=0.5)
-    return f"; did you mean {close[0]}?" if close else ""
+def _beside(path: Path, airport: Any) -> dict[str, str]:
+    """The airport of a settings file, where that is a path and not the code of a shipped one."""
+    if not isinstance(airport, str):
+        return {}
+    beside = path.absolute().parent / Path(airport).expanduser()
+    is_path = Path(airport).suffix.lower() in (".geojson", ".json") or "/" in airport or beside.is_file()
+    return {"airport": str(beside)} if is_path else {}

@@ -17,6 +17,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from app.secret_urls import SecretUrl
 from app.settings import NodeSettings, PartSettings, PartsSettings, RadarSettings, RunwaySettings, Settings
 from pipeline import parts
 
@@ -106,6 +107,8 @@ def _setting(key: str, field: FieldInfo, path: str) -> Iterator[str]:
     if default is None or default is PydanticUndefined:
         notes.append("not set by default")
         default = _stand_in(field.annotation)
+    if isinstance(default, SecretUrl):
+        default = str(default)
     yield from _prose("; ".join(notes))
     yield f"#{key} = {toml_value(default)}"
 

@@ -8,6 +8,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from fastapi import APIRouter, FastAPI, WebSocket
+from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
 from starlette.responses import Response
 
@@ -16,7 +17,7 @@ from app.api.asyncapi import document as asyncapi_document
 from app.api.context import Context, answer
 from app.api.intake import intake_router
 from app.api.metrics import metrics_router
-from app.api.middleware import Guard
+from app.api.middleware import Guard, allowed_hosts
 from app.api.openapi import document, operation_id, served_at
 from app.api.pages import pages_router
 from app.api.parts import parts_router
@@ -74,6 +75,8 @@ def create_app(service: Service, *, hub: Hub, store: Store | None, view3d_router
         allowed_origins=settings.allowed_origins,
         root_path=settings.root_path,
     )
+    # outermost: nothing is answered, and no WebSocket opened, under a foreign name
+    app.add_middleware(TrustedHostMiddleware, allowed_hosts=allowed_hosts(settings), www_redirect=False)
     app.include_router(_operation_router(service))
     app.include_router(surveillance_router(context))
     app.include_router(video_router(context))

@@ -11,6 +11,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from app.api.problems import ApiProblem, problem
 from app.api.subpath import below, path_below, root_of
 from app.live.session import origin_allowed
+from app.settings import Settings
 
 STRICT = (
     "default-src 'self'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
@@ -36,7 +37,17 @@ PREFLIGHT = {
     "Access-Control-Allow-Headers": "*",
     "Access-Control-Max-Age": "86400",
 }
+LOOPBACK = ("localhost", "127.0.0.1", "::1")
 WRITING = frozenset({"POST", "PUT", "PATCH", "DELETE"})
+
+
+def allowed_hosts(settings: Settings) -> list[str]:
+    """What the Host of a request may be: loopback names, the address listened on, and what the settings add.
+
+    A page of a foreign name that was made to point to this machine would otherwise count as a page of this service.
+    """
+    names = (*LOOPBACK, settings.host, *settings.allowed_hosts)
+    return list(dict.fromkeys(name for one in names for name in ((one, f"[{one}]") if ":" in one else (one,))))
 
 
 class Guard:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -43,4 +43,21 @@ for _module in pkgutil.iter_modules(__path__):
 
 def main() -> None:
     """Run the command line (the `airside` script)."""
-    app()
+    from app.console import any_terminal
+
+    any_terminal()
+    try:
+        app()
+    except (OSError, ValueError) as error:
+        _end(error)
+
+
+def _end(error: OSError | ValueError) -> NoReturn:
+    """End with one line for what lies outside the program; anything else is a fault of it, and told as a whole."""
+    from app.console import fail
+    from app.settings import SettingsError
+    from pipeline.airport.geojson import AirportFault
+
+    if isinstance(error, ValueError) and not isinstance(error, SettingsError | AirportFault):
+        raise error
+    raise SystemExit(fail(str(error)).exit_code) from None

@@ -53,17 +53,17 @@ def bench(
     from app.bench.tables import figures_table, timed_table
 
     console = Console()
-    with console.status("Compiling, or loading compiled kernels ..."):
+    with console.status("Compiling, or loading compiled kernels ...", spinner="line"):
         front_end = _front_end(repeats, peers)
     console.print(timed_table("Radar front end, one turn of 4096 x 1024 x 8 bit", front_end))
-    with console.status("Tracking thousands of targets ..."):
+    with console.status("Tracking thousands of targets ...", spinner="line"):
         tracking = _tracker(repeats, peers)
     console.print(timed_table("Tracker, one turn of 1,000 targets", tracking))
     served: list[QualityRow] = []
     if service:
         from app.bench.report import service_rows
 
-        with console.status("Starting the service ...") as status:
+        with console.status("Starting the service ...", spinner="line") as status:
             served = list(service_rows(seconds, lambda what: status.update(f"Measuring: {what} ...")))
         console.print(figures_table("The running service", served))
     _write(json, [*front_end, *tracking, *served])
@@ -92,7 +92,7 @@ def tracker(
     from pipeline.lab.measure.stopwatch import Stopwatch
 
     console = Console()
-    with console.status("Compiling, or loading compiled kernels; tracking thousands of targets ..."):
+    with console.status("Compiling, or loading compiled kernels; tracking thousands of targets ...", spinner="line"):
         rows = bench_tracker(Stopwatch(time.perf_counter, turns, frames()), seed=seed)
     console.print(timed_table(f"Tracker, median of {turns} turns", rows))
     _write(json, rows)
@@ -136,7 +136,7 @@ def journal(
     from app.bench.tables import figures_table
 
     console = Console()
-    with console.status("") as status:
+    with console.status("", spinner="line") as status:
         cost = measure_journal(seconds, targets, seed, lambda what: status.update(f"{what} ..."))
     title = f"The journal without raw sweeps, {cost.targets} targets ({cost.tracks:.0f} tracks), {cost.seconds:g} s"
     console.print(figures_table(title, cost.rows()))

@@ -24,19 +24,18 @@ def migrate(
 
     Examples: [bold]airside migrate[/bold], [bold]airside migrate --url postgresql+psycopg://user@host/airside[/bold]
     """
-    from sqlalchemy.engine import make_url
     from sqlalchemy.exc import SQLAlchemyError
 
     from app.console import fail
+    from app.secret_urls import masked_text
     from app.settings import SettingsError, load
     from app.store.database import migrate as bring_up_to_date
 
     try:
         database = url or load(settings).database
         bring_up_to_date(database)
-        shown = make_url(database).render_as_string(hide_password=True)
     except SettingsError as error:
         raise fail(str(error)) from error
     except (SQLAlchemyError, OSError) as error:
         raise fail(f"the database cannot be migrated: {error}", 1) from error
-    typer.echo(f"{shown} is up to date")
+    typer.echo(f"{masked_text(database)} is up to date")

@@ -47,6 +47,7 @@ def _run(path: Path | None, mode: str, port: int | None, host: str | None, recor
 
     from app.console import fail
     from app.settings import SettingsError, load
+    from pipeline.airport.geojson import AirportFault
 
     overrides = {"port": port, "host": host, "mode": mode}
     console = Console(stderr=False)
@@ -62,6 +63,6 @@ def _run(path: Path | None, mode: str, port: int | None, host: str | None, recor
         from app.run import serve as run
 
         status = run(settings, console)
-    except SettingsError as error:
+    except (SettingsError, AirportFault, OSError) as error:
         raise fail(str(error)) from error
     raise typer.Exit(status)

@@ -36,7 +36,7 @@ def traffic(
     console = Console()
     try:
         airport, _ = load_airport(icao)
-        with console.status(f"cleaning {file}"):
+        with console.status(f"cleaning {file}", spinner="line"):
             recording, report, window = prepare(file, airport, minutes * 60.0, attribution)
             size = write_recording(output, recording, airport, report)
     except (AirportFault, RecordingError, OSError) as error:

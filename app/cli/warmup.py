@@ -28,13 +28,13 @@ def warmup() -> None:
     begun = time.perf_counter()
     settings = demo_settings(load())
     service = SurfaceService(settings, *load_airport(settings.airport))
-    with console.status("compiling the kernels of the chain and the tracker"):
+    with console.status("compiling the kernels of the chain and the tracker", spinner="line"):
         service.prepare(resume=False)
-    with console.status("compiling the kernels of the other parts of a radar"):
+    with console.status("compiling the kernels of the other parts of a radar", spinner="line"):
         for verb in FRONT_END:
             for name in parts.available(verb):
                 made = {**build_parts(settings, FRONT_END), verb: parts.build(verb, name)}
                 chain_of(service.radars[0], 0, made, None).warm()
-    with console.status("compiling the kernels of the simulator"):
+    with console.status("compiling the kernels of the simulator", spinner="line"):
         warm_simulator()
     console.print(f"every kernel is compiled ({time.perf_counter() - begun:.1f} s)")

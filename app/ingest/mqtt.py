@@ -46,7 +46,7 @@ async def listen(
     ValueError when the settings have no URL or one that is not mqtt:// or mqtts://.
     """
     counted: Counter[str] = Counter() if counters is None else counters
-    address = parse_url(settings.url)
+    address = parse_url(_plain(settings))
     wait = FIRST_WAIT_S
     while True:
         try:
@@ -77,7 +77,7 @@ class MqttThread:
     """`listen` in a thread with its own event loop, for the service."""
 
     def __init__(self, settings: MqttSettings, service: _Service) -> None:
-        parse_url(settings.url)
+        parse_url(_plain(settings))
         self._settings, self._service = settings, service
         self._counted: Counter[str] = Counter()
         self._loop = asyncio.new_event_loop()
@@ -116,6 +116,10 @@ class MqttThread:
     def _cancel(self) -> None:
         if self._task is not None:
             self._task.cancel()
+
+
+def _plain(settings: MqttSettings) -> str | None:
+    return settings.url.get_secret_value() if settings.url is not None else None
 
 
 class Address:

@@ -26,6 +26,9 @@ from pipeline.tables import Sweeps, VideoFormat
 
 log = logging.getLogger(__name__)
 
+LOOPBACK = "127.0.0.1"
+EVERY_ADDRESS = "0.0.0.0"
+
 BUFFER_BYTES = 32 * 1024 * 1024
 """Asked of the system for datagrams that wait: three seconds of a large radar."""
 
@@ -204,15 +207,19 @@ class PlainRing:
 
 
 def open_socket(udp: UdpSettings) -> socket.socket:
-    """A bound socket with the largest buffer the system grants, joined to the group if there is one. Raises OSError."""
-    family = socket.AF_INET6 if ":" in udp.address else socket.AF_INET
+    """A bound socket with the largest buffer the system grants, joined to the group if there is one. Raises OSError.
+
+    Without an address it hears this machine alone, and what is sent to the group where there is one.
+    """
+    address = udp.address or (LOOPBACK if udp.group is None else EVERY_ADDRESS)
+    family = socket.AF_INET6 if ":" in address else socket.AF_INET
     opened = socket.socket(family, socket.SOCK_DGRAM)
     try:
         _enlarge(opened)
         if udp.group is not None:
             # several listeners may share a group; on a plain port a second one would silently take the datagrams away
             opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        opened.bind((udp.address, udp.port))
+        opened.bind((address, udp.port))
         if udp.group is not None:
             _join(opened, udp.group, udp.interface)
         if socket_kernel.AVAILABLE:
@@ -221,7 +228,7 @@ def open_socket(udp: UdpSettings) -> socket.socket:
             opened.setsockopt(socket.SOL_SOCKET, _RXQ_OVFL, 1)
     except OSError as error:
         opened.close()
-        where = f"udp {udp.group or udp.address}:{udp.port}"
+        where = f"udp {udp.group or address}:{udp.port}"
         raise OSError(error.errno, f"{where}: {error.strerror or error}") from error
     return opened
 

@@ -5,13 +5,9 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from app.secret_urls import MASK, masked_text
 from app.settings import Settings
 
-MASK = "***"
-"""What stands in place of a secret."""
-
-_USER_INFO = re.compile(r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*://)[^/?#\s]*@")
-_SECRET_QUERY = re.compile(r"(?i)(?P<key>[?&][^=&#\s]*(?:password|passwd|secret|token|key|auth)[^=&#\s]*=)[^&#\s]*")
 _SECRET_NAME = re.compile(r"(?i)password|passwd|secret|token|credential")
 
 
@@ -22,11 +18,6 @@ def masked(settings: Settings) -> dict[str, Any]:
     """
     plain: dict[str, Any] = settings.model_dump(mode="json")
     return {key: _masked(key, value) for key, value in plain.items()}
-
-
-def masked_text(text: str) -> str:
-    """A text in which the user info and the secret parameters of every URL are replaced by "***"."""
-    return _SECRET_QUERY.sub(rf"\g<key>{MASK}", _USER_INFO.sub(rf"\g<scheme>{MASK}@", text))
 
 
 def _masked(key: str, value: Any) -> Any:

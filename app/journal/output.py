@@ -12,6 +12,7 @@ from mcap.writer import CompressionType, Writer
 
 from app.journal.names import FORMAT_VERSION, PROFILE, RUN_METADATA
 from app.journal.schemas import MESSAGE_ENCODING, SCHEMA_ENCODING, ChannelSchema, schema_of
+from app.private_files import FILE_MODE
 
 CHUNK_BYTES = 4 * 1024 * 1024
 """Uncompressed octets after which a chunk is closed: two seconds of a busy airport, long enough to compress well."""
@@ -46,7 +47,7 @@ class _Stream:
     """A file without a buffer of its own, so that nothing of a failed write is tried again at the end."""
 
     def __init__(self, path: Path) -> None:
-        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o640)
+        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, FILE_MODE)
         self.written = 0
 
     def write(self, data: bytes) -> int:

@@ -14,6 +14,7 @@ from typing import Literal, Self
 
 from app.journal.names import GAP, SNAPSHOT, FileName, journal_files, parsed, size_of, start_text
 from app.journal.output import CHUNK_BYTES, JournalOutput
+from app.private_files import FOLDER_MODE
 from app.settings import JournalSettings
 from pipeline.values import ValueCodec
 
@@ -139,8 +140,7 @@ class JournalWriter:
         self._sequence = 0
         self._dropping: _Gap | None = None
         self._begun = False
-        self._snapshots_waiting = 0
-        self._snapshots_taken = 0
+        self._snapshots_waiting = self._snapshots_taken = 0
         self._last_snapshot: float | None = None
         self._closed = False
         self._stopped = ""
@@ -152,7 +152,7 @@ class JournalWriter:
         self._rotation_due = False
         self._octets_before = 0
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
             journal_files(folder)
         except OSError as error:
             self._stop(error)

@@ -63,7 +63,7 @@ def find_destination(settings: Settings, radar: str | None, to: str | None) -> D
         return Destination(USUAL, None)
     if chosen.udp is None or chosen.udp.port == 0:
         raise SettingsError(f"radar {chosen.id} has no fixed UDP port; say where to send with --to")
-    host = chosen.udp.group or chosen.udp.address
+    host = chosen.udp.group or chosen.udp.address or settings.udp_address
     return Destination(("127.0.0.1" if host in ("0.0.0.0", "::") else host, chosen.udp.port), chosen)
 
 

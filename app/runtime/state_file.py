@@ -14,6 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from app.private_files import FOLDER_MODE, make_private_file
 from pipeline.state import StateError
 
 SAVED_AT = "file.saved_at"
@@ -23,10 +24,11 @@ MOST_ARRAYS = 256
 
 def write_state(path: Path, arrays: Mapping[str, NDArray[Any]], saved_at: float, scene: str) -> None:
     """Put the arrays into the file in one step. saved_at: UTC s. scene: what else they belong to. Raises OSError."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    path.parent.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
     beside = path.with_name(f".{path.name}.new")
     kept = {**arrays, SAVED_AT: np.array(saved_at), SCENE: np.array(scene)}
     try:
+        make_private_file(beside)
         with beside.open("wb") as file:
             np.savez(file, allow_pickle=False, **kept)
             file.flush()

@@ -16,6 +16,7 @@ from typing import Any
 from sqlalchemy import Connection, Engine, bindparam, insert, select, update
 from sqlalchemy.exc import DBAPIError, InterfaceError, OperationalError, SQLAlchemyError
 
+from app.secret_urls import masked_text
 from app.store import schema
 from app.store.batch import Batch, Queue
 from app.store.retention import Retention
@@ -85,7 +86,7 @@ class Writer:
             except (OperationalError, InterfaceError) as error:
                 if not self.failing:
                     log.error("the database cannot be written, trying again: %s", error.orig)
-                self.failing = str(error.orig)
+                self.failing = masked_text(str(error.orig))
                 self.counters["retries"] += 1
                 now = time.monotonic()
                 if self.queue.closed:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import socket
 from typing import Any
 
 import httpx
 import pytest
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
 
+from app.api.middleware import allowed_hosts
+from app.settings import Settings
 from tests.support.running import Server
 
 FOREIGN = {"origin": "https://map.example"}
@@ -75,3 +80,34 @@ def test_nothing_can_be_written_where_everyone_may_read(http: httpx.Client, serv
         assert http.request(method, "/data/aircraft.json").status_code == 405
     paths = httpx.get(f"{server.url}/openapi.json").json()["paths"]
     assert [path for path, calls in paths.items() if path.startswith("/data") and set(calls) != {"get"}] == []
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "evil.example:8000", "localhost.evil.example", "127.0.0.1.evil.example", ""]
+)
+def test_nothing_is_answered_under_a_foreign_name(http: httpx.Client, server: Server, host: str) -> None:
+    own = {"host": host, "origin": f"http://{host}"}
+    for path in ("/", "/api/v1/picture", "/data/aircraft.json", "/3d/", "/health/live", "/metrics", "/nothing"):
+        assert http.get(path, headers=own).status_code == 400, path
+    assert http.options("/data/aircraft.json", headers=own).status_code == 400
+    assert http.put("/api/v1/runways/09-27/state", headers=own, json={"open": False}).status_code == 400
+    for path in ("/api/v1/live", "/3d/"):
+        opened = socket.create_connection(("127.0.0.1", server.port), timeout=10)
+        with pytest.raises(InvalidStatus) as refused:
+            connect(f"ws://{host or 'x'}{path}", sock=opened, proxy=None)
+        opened.close()
+        assert refused.value.response.status_code == 400
+
+
+@pytest.mark.parametrize("host", ["localhost", "LOCALHOST:1", "127.0.0.1", "[::1]:8000"])
+def test_loopback_names_are_answered(http: httpx.Client, host: str) -> None:
+    assert http.get("/api/v1/picture", headers={"host": host}).status_code == 200
+
+
+def test_the_address_listened_on_and_listed_names_are_allowed() -> None:
+    assert {"10.1.2.3", "tower.example"} < set(
+        allowed_hosts(Settings(host="10.1.2.3", allowed_hosts=("tower.example",)))
+    )
+    for wrong in ("http://tower.example", "tower.example:8000", "*tower", ""):
+        with pytest.raises(ValueError, match="without scheme and port"):
+            Settings(allowed_hosts=(wrong,))

@@ -1,0 +1,36 @@
+"""Folders and files that only the user of the service may read: positions, alerts, and who acknowledged them."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from app.settings import SettingsError
+
+FOLDER_MODE = 0o700
+FILE_MODE = 0o600
+
+
+def make_private_folder(path: Path, setting: str) -> None:
+    """Make a folder for this user alone; one that is there keeps its mode, and must be one that can be written.
+
+    setting: that names it. Raises SettingsError.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.mkdir(mode=FOLDER_MODE, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path):
+            pass
+    except OSError as error:
+        raise SettingsError(f"{setting}: {path}: cannot be written: {error.strerror}") from error
+
+
+def make_private_file(path: Path) -> None:
+    """Make an empty file for this user alone, or take the reading of others away from one of this user's.
+
+    Raises OSError when it cannot be made.
+    """
+    os.close(os.open(path, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, FILE_MODE))
+    if path.stat().st_uid == os.geteuid():
+        path.chmod(FILE_MODE)
