@@ -20,6 +20,8 @@ import { drawSymbol, extentOf, symbolRadius } from './symbols.js';
  * @property {Map<number, 'information'|'alarm'>} alerted
  * @property {Set<number>} unacknowledged  targets of alarms nobody has acknowledged
  * @property {boolean} flashOn
+ * @property {import('../types.js').MapFeature[]} holds  the holding positions of the map
+ * @property {Set<number>} occupants  of any runway's protection area
  */
 
 /** Bring every target to where it is now. @param {Scene} scene @param {number} nowMs */
