@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from tests.static.conftest import Screen
 from tests.static.serving import Serving
+from tests.support.fake_traffic import Mover
 
 pytestmark = pytest.mark.browser
 
@@ -64,3 +66,40 @@ def test_on_a_phone_the_list_lies_over_the_picture_and_help_fits(screen: Screen)
     assert help_box["x"] + help_box["width"] <= 360
     assert help_box["y"] + help_box["height"] <= 640
     assert page.locator("#help").evaluate("(one) => one.scrollWidth <= one.clientWidth"), "its text is not cut"
+
+
+def test_no_label_is_cut_at_an_edge(screen: Screen) -> None:
+    for width, height in ((360, 640), (1280, 800)):
+        screen.page.set_viewport_size({"width": width, "height": height})
+        screen.until("airside.labels().length > 10")
+        for _ in range(10):
+            view = screen.ask("view()")
+            for one in screen.ask("labels()"):
+                assert one["x"] >= -0.5, one
+                assert one["y"] >= -0.5, one
+                assert one["x"] + one["w"] <= view["width"] + 0.5, one
+                assert one["y"] + one["h"] <= view["height"] + 0.5, one
+            screen.page.wait_for_timeout(100)  # they move on
+
+
+def test_what_stands_at_a_holding_position_is_labelled_however_far_one_zooms_out(
+    screen: Screen, serving: Serving
+) -> None:
+    service = serving.service
+    kept = list(service.movers)
+    standing = [i for i, one in enumerate(kept) if one.speed == 0.0]
+    holds = service.airport.holding_positions
+    for i, hold in zip(standing, holds, strict=False):
+        service.movers[i] = Mover(np.asarray(hold.line.coords), 0.0, 0.0)
+    try:
+        screen.page.locator("#stage").focus()
+        for _ in range(4):
+            screen.page.keyboard.press("-")
+        assert screen.ask("view().scale") < 0.1
+        wanted = {i + 1 for i, _ in zip(standing, holds, strict=False)}
+        assert len(wanted) > 4
+        shown = "new Set(airside.labels().map((one) => one.id))"
+        screen.until(f"((shown) => {sorted(wanted)}.every((id) => shown.has(id)))({shown})")
+    finally:
+        service.movers[:] = kept
+    assert screen.errors == []
