@@ -83,7 +83,7 @@ class Guard:
         ):
             return problem(
                 403,
-                f"the page comes from {headers.get('origin')} and this service takes itself to be {headers.get('host')}: "
+                f"the page comes from {headers.get('origin')} and this service is called as {headers.get('host')}: "
                 "have the proxy pass on the Host of the request, or add the origin to allowed_origins in the settings",
             )
         return None

@@ -34,7 +34,7 @@ export const KEYS = [
 ];
 /** @type {[string, string][]} */
 export const MOUSE = [
-  ['drag', 'pan'], ['wheel', 'zoom at the cursor'], ['Shift + drag, wheel', 'rotate'], ['click', 'select a target'],
+  ['drag', 'pan'], ['wheel', 'zoom at the cursor'], ['Shift + drag, wheel', 'rotate'], ['click', 'select a target; the dotted circle holds its position with 95 %'],
   ['drag a label', 'pin it'], ['double click a label', 'release it'],
 ];
 
