@@ -92,7 +92,11 @@ class Guard:
         if scope["method"] in WRITING and not origin_allowed(
             headers.get("origin"), headers.get("host"), self.allowed_origins
         ):
-            return problem(403, "pages of another origin may not write here")
+            return problem(
+                403,
+                f"the page comes from {headers.get('origin')} and this service is called as {headers.get('host')}: "
+                "have the proxy pass on the Host of the request, or add the origin to allowed_origins in the settings",
+            )
         return None
 
     def _counted(self, receive: Receive) -> Receive:

@@ -129,10 +129,8 @@ class Situation:
         return self.frames.designators[runway][int(self.way[runway, row])]
 
     def label(self, row: int) -> str:
-        """What a controller would call the target."""
-        callsign = str(self.tracks.callsign[row]).strip()
-        number = int(self.tracks.shown_number[row])
-        return callsign or f"{TargetClass(int(self.tracks.category[row])).name.title()} {number}"
+        """What a controller calls the target, as the displays do: "AFR123", or "#17" where it has no callsign."""
+        return str(self.tracks.callsign[row]).strip() or f"#{int(self.tracks.shown_number[row])}"
 
     @cached_property
     def aircraft(self) -> Array:

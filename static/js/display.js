@@ -41,11 +41,13 @@ export class Display {
     this.placedView = -1;
     this.drawnMs = 0;
     this.alertVersion = -1;
+    this.statusVersion = -1;
     this.radar = new RadarLayer(() => this.touch(1));
     /** @type {import('./draw/targets.js').Scene} */
     this.scene = {
       picture: this.picture, view: this.view, theme: applyTheme(settings.choices.palette), choices: settings.choices,
       selected: null, hovered: null, alerted: new Map(), unacknowledged: new Set(), flashOn: true,
+      holds: [], occupants: new Set(),
     };
     this.stage.add('map', (context) => this.drawMap(context), false);
     this.stage.add('radar', (context) => this.radar.draw(context, this.view, this.stage.ratio, this.scene.theme), false);
@@ -76,6 +78,7 @@ export class Display {
   /** @param {import('./types.js').AirportMap} airport */
   setAirport(airport) {
     this.map = new MapLayer(airport);
+    this.scene.holds = this.map.holds;
     this.radar.projection = airport.projection;
     this.touch(0);
   }
@@ -105,6 +108,10 @@ export class Display {
       scene.unacknowledged = new Set([...picture.alerts.values()].filter((one) => one.stage === 'alarm' && needsAttention(one)).flatMap((one) => one.targets.map((t) => t.track)));
       this.placedMs = -Infinity;
       this.touch(0);
+    }
+    if (this.statusVersion !== picture.statusVersion) {
+      this.statusVersion = picture.statusVersion;
+      scene.occupants = new Set([...picture.runways.values()].flatMap((one) => one.occupants ?? []));
     }
     scene.selected = this.selected;
     scene.flashOn = this.still.matches || nowMs % FLASH_MS < FLASH_MS * 0.55;

@@ -16,6 +16,10 @@ export function exposeHook(display, feed, status, replay) {
     }),
     /** where each target is drawn: metres and screen */
     positions: () => [...picture.targets.values()].map(({ track, e, n, x, y }) => ({ id: track.id, e, n, x, y })),
+    /** the labels that are drawn: whose, what they say, and their box on the screen */
+    labels: () => [...picture.targets.values()].filter((one) => display.labels.isDrawn(one, view)).map(({ track, label, x, y }) => ({
+      id: track.id, first: label.text?.first, second: label.text?.second, x: x + label.sx, y: y + label.sy, w: label.w, h: label.h,
+    })),
     /** the view */
     view: () => ({ east: view.east, north: view.north, scale: view.scale, rotation: view.rotation, width: view.width, height: view.height }),
     alerts: () => picture.liveAlerts().map(({ id, stage: level, state }) => ({ id, stage: level, state })),

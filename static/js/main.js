@@ -2,7 +2,7 @@
 
 import { Display } from './display.js';
 import { LiveFeed } from './feed/live.js';
-import { fetchAirport, fetchCleared } from './feed/rest.js';
+import { fetchAirport, fetchCleared, fetchRefusal } from './feed/rest.js';
 import { exposeHook } from './hook.js';
 import { onKey } from './input/keys.js';
 import { bindPointer } from './input/pointer.js';
@@ -56,7 +56,7 @@ const target = new TargetPanel(picture, {
     if (found) view.centre(found.e, found.n, Math.max(view.scale, 0.8));
   },
 });
-const list = new TargetList(picture, { onOpen: (id) => display.select(id, true), onToggle: (open) => settings.set({ list: open }) });
+const list = new TargetList(picture, { onOpen: (id) => display.select(id, true), onToggle: () => actions.list() });
 const tools = bindToolbar(settings);
 const help = makeHelp();
 settings.watch((choices) => list.setOpen(choices.list));
@@ -67,7 +67,11 @@ let link = 'connecting';
 const feed = new LiveFeed({
   url: new URL('api/v1/live', document.baseURI).href.replace(/^http/, 'ws'),
   position: () => picture.position(),
-  onState: (state) => { link = state; },
+  onState: (state) => {
+    link = state;
+    if (state === 'live') status.refusal = '';
+  },
+  onRefused: async () => { status.refusal = await fetchRefusal(); },
   onMessage: (message) => {
     const before = picture.alertVersion;
     if (picture.apply(message, performance.now()) === 'gap') feed.restart();
@@ -124,7 +128,11 @@ const actions = {
     settings.set({ list: true });
     list.focus();
   },
-  list: () => settings.set({ list: !settings.choices.list }),
+  list: () => {
+    settings.set({ list: !settings.choices.list });
+    if (settings.choices.list) list.enter(display.selected);
+    else host.focus();
+  },
   measure,
   follow,
   sound: toggleSound,

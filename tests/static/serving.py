@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import re
 import socket
 import threading
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import uvicorn
@@ -78,3 +81,31 @@ class Serving:
         self.down()
         self._over.set()
         self._pictures.join(5)
+
+
+@contextlib.contextmanager
+def changing_host(port: int, host: str) -> Iterator[int]:
+    """A proxy on loopback that gives another Host to what it passes on to `port`; yields the port of its own."""
+    listening = socket.create_server(("127.0.0.1", 0))
+
+    def pump(source: socket.socket, sink: socket.socket, changed: bool) -> None:
+        with contextlib.suppress(OSError):
+            while data := source.recv(65536):
+                sink.sendall(re.sub(rb"(?i)\r\nhost: [^\r]*", b"\r\nHost: " + host.encode(), data) if changed else data)
+        for one in (source, sink):
+            with contextlib.suppress(OSError):
+                one.shutdown(socket.SHUT_RDWR)
+
+    def accept() -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                here, _ = listening.accept()
+                there = socket.create_connection(("127.0.0.1", port))
+                for way in ((here, there, True), (there, here, False)):
+                    threading.Thread(target=pump, args=way, daemon=True).start()
+
+    threading.Thread(target=accept, daemon=True).start()
+    try:
+        yield listening.getsockname()[1]
+    finally:
+        listening.close()

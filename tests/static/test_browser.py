@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from tests.static.conftest import Screen
-from tests.static.serving import Serving
+from tests.static.serving import Serving, changing_host
 from tests.support.running import until
 
 pytestmark = pytest.mark.browser
@@ -183,12 +183,81 @@ def test_a_runway_is_closed_and_opened_from_its_menu(screen: Screen, serving: Se
     card = screen.page.locator("#runway-list .runway", has_text="07/25")
     card.locator(".runway-set").click()
     card.get_by_role("menuitemradio", name="Closed").click()
+    assert serving.service.runways["07/25"].open is True, "it asks first"
+    screen.page.keyboard.press("Enter")
+    card.locator(".menu").wait_for(state="detached")
+    assert serving.service.runways["07/25"].open is True, "an Enter too many does not close it"
+    card.locator(".runway-set").click()
+    card.get_by_role("menuitemradio", name="Closed").click()
+    card.get_by_role("menuitem", name="Close runway 07/25").click()
     card.locator(".chip.closed").wait_for()
     assert serving.service.runways["07/25"].open is False
     card.locator(".runway-set").click()
     card.get_by_role("menuitemradio", name="Open").click()
     card.locator(".chip.closed").wait_for(state="detached")
     assert screen.errors == []
+
+
+def test_a_closed_runway_is_as_before_after_undo_and_undo_is_offered_for_10_s(screen: Screen, serving: Serving) -> None:
+    serving.service.set_runway("06/24", open=True, in_use="24", visibility="low")
+    before = serving.service.runways["06/24"]
+    card = screen.page.locator("#runway-list .runway", has_text="06/24")
+    card.locator(".chip.lvp").wait_for()
+    undo = card.locator(".runway-undo")
+    assert undo.is_hidden()
+    try:
+        for wanted in (True, False):
+            card.locator(".runway-set").click()
+            card.get_by_role("menuitemradio", name="Closed").click()
+            card.get_by_role("menuitem", name="Close runway 06/24").click()
+            card.locator(".chip.closed").wait_for()
+            undo.wait_for()
+            if wanted:
+                undo.click()
+                until(lambda: serving.service.runways["06/24"] == before, "all of it is as it was")
+                undo.wait_for(state="hidden")
+                card.locator(".chip.closed").wait_for(state="detached")
+        undo.wait_for(state="hidden", timeout=20000)
+        assert serving.service.runways["06/24"].open is False
+    finally:
+        serving.service.set_runway("06/24", open=True, in_use="06", visibility="normal")
+    assert screen.errors == []
+
+
+def test_t_moves_the_focus_into_the_list_and_back(screen: Screen) -> None:
+    page = screen.page
+    focus = "document.activeElement.closest('#list-rows') !== null"
+    page.keyboard.press("t")
+    assert page.evaluate(focus)
+    first = page.evaluate("document.activeElement.textContent")
+    north = screen.ask("view().north")
+    page.keyboard.press("ArrowDown")
+    assert screen.ask("view().north") == north, "the arrows go through the list"
+    assert page.evaluate(focus)
+    assert page.evaluate("document.activeElement.textContent") != first
+    page.keyboard.press("Enter")
+    assert screen.ask("selected()") is not None
+    page.keyboard.press("t")
+    assert page.locator("#list").is_hidden()
+    assert page.evaluate("document.activeElement.id") == "stage", "the focus does not stay in what is hidden"
+    page.keyboard.press("t")
+    assert page.evaluate("document.activeElement.getAttribute('aria-current')") == "true", (
+        "it begins at the selected one"
+    )
+    assert screen.errors == []
+
+
+def test_a_page_that_the_service_refuses_says_why(serving: Serving, browser: Any) -> None:
+    """A proxy that does not pass on the Host of the request makes the page one of another origin."""
+    with changing_host(serving.port, "inside.example") as port:
+        page = browser.new_page()
+        page.goto(f"http://127.0.0.1:{port}")
+        banner = page.locator("#banner", has_text="allowed_origins")
+        banner.wait_for(timeout=20000)
+        assert f"http://127.0.0.1:{port}" in banner.inner_text()
+        assert "inside.example" in banner.inner_text()
+        assert page.locator("#link").inner_text() == "refused"
+        page.close()
 
 
 def test_the_wheel_zooms_at_the_cursor_and_a_click_selects(screen: Screen) -> None:

@@ -2,8 +2,9 @@
 
 import { classOf, isAirborne, isCoasting, isStanding, labelText } from '../model/label_text.js';
 import { isNumber } from '../model/format.js';
+import { isNearHold } from '../model/holds.js';
 import { coastedS } from '../model/motion.js';
-import { placeLabels } from '../model/placement.js';
+import { clampInto, placeLabels } from '../model/placement.js';
 import { onScreen, radiusOf } from './targets.js';
 
 /** @typedef {import('../types.js').Target} Target */
@@ -14,7 +15,9 @@ const SECOND = '11px system-ui, "DejaVu Sans", sans-serif';
 const MARK = '600 8px system-ui, "DejaVu Sans", sans-serif';
 const LINE = 14;
 const PAD = 3;
-/** Below this scale standing targets keep their names to themselves, px/m. */
+/** From this priority on a label is shown at every scale, and where it overlaps: on a runway, at a holding position, in an alert. */
+const MUST = 60;
+/** Below this scale other standing targets keep their names to themselves, px/m. */
 const STANDING_FROM = 0.3;
 /** From this many targets on the screen labels are shortened. */
 const CROWD = 90;
@@ -56,7 +59,7 @@ export class LabelLayer {
     if (stage === 'alarm') return 100;
     if (stage) return 90;
     if (track.id === scene.selected || track.id === scene.hovered) return 80;
-    if (track.runway || isAirborne(track)) return 60;
+    if (track.runway || isAirborne(track) || scene.occupants.has(track.id) || isNearHold(scene.holds, track)) return MUST;
     const moving = isStanding(track) ? 0 : 20;
     return moving + (classOf(track) === 'aircraft' ? 20 : classOf(track) === 'vehicle' ? 10 : 0);
   }
@@ -67,7 +70,7 @@ export class LabelLayer {
    */
   place(context, scene, keepClear = []) {
     const { picture, view, choices } = scene;
-    const here = [...picture.targets.values()].filter((one) => onScreen(one, view, 10));
+    const here = [...picture.targets.values()].filter((one) => onScreen(one, view, 0));
     const crowded = here.length > CROWD && view.scale < 0.6;
     const candidates = here.map((target) => ({ target, priority: this.priority(scene, target) }))
       .sort((a, b) => b.priority - a.priority || a.target.track.id - b.target.track.id);
@@ -82,7 +85,7 @@ export class LabelLayer {
       [label.w, label.h] = this.size(context, label.text);
       requests.push({
         id: target.track.id, x: target.x, y: target.y, radius: radiusOf(target, view.scale),
-        w: label.w, h: label.h, slot: label.slot, must: priority >= 60, pinned: label.pinned,
+        w: label.w, h: label.h, slot: label.slot, must: priority >= MUST, pinned: label.pinned,
       });
     }
     const symbols = here.map((one) => ({ id: one.track.id, x: one.x, y: one.y, radius: Math.min(16, radiusOf(one, view.scale)) }));
@@ -112,11 +115,11 @@ export class LabelLayer {
     if (priority >= 80) return 'full';
     if (wanted === 'off') return 'off';
     if (target.label.pinned) return wanted;
-    if (isStanding(target.track) && !target.track.runway) {
+    if (priority < MUST && isStanding(target.track)) {
       if (scale < STANDING_FROM) return 'off';
       return scale < 0.8 ? 'short' : wanted;
     }
-    return crowded && priority < 60 ? 'short' : wanted;
+    return crowded && priority < MUST ? 'short' : wanted;
   }
 
   /** @param {CanvasRenderingContext2D} context @param {import('../types.js').LabelText} text @returns {[number, number]} */
@@ -127,12 +130,18 @@ export class LabelLayer {
     return [Math.ceil(Math.max(first, second)) + 2 * PAD, (text.second ? 2 : 1) * LINE + PAD];
   }
 
+  /** @param {Target} target @param {import('../geo/viewport.js').Viewport} view @returns {boolean} its label is on the screen */
+  isDrawn(target, view) {
+    return target.label.visible && onScreen(target, view, 0);
+  }
+
   /** @param {CanvasRenderingContext2D} context @param {Scene} scene @param {number} ease 0..1 of the way to a new place */
   draw(context, scene, ease) {
-    const targets = [...scene.picture.targets.values()].filter((one) => one.label.visible && onScreen(one, scene.view, 60));
-    for (const { label } of targets) {
-      label.sx += (label.dx - label.sx) * ease;
-      label.sy += (label.dy - label.sy) * ease;
+    const targets = [...scene.picture.targets.values()].filter((one) => this.isDrawn(one, scene.view));
+    for (const { label, x, y } of targets) {
+      // between two placements the target moves, and a pinned label goes where it was put: neither may cut the text
+      label.sx = clampInto(x + label.sx + (label.dx - label.sx) * ease, label.w, scene.view.width) - x;
+      label.sy = clampInto(y + label.sy + (label.dy - label.sy) * ease, label.h, scene.view.height) - y;
     }
     this.leaders(context, scene, targets);
     context.textAlign = 'left';
@@ -207,7 +216,7 @@ export class LabelLayer {
   at(scene, x, y) {
     for (const target of scene.picture.targets.values()) {
       const { label } = target;
-      if (!label.visible) continue;
+      if (!this.isDrawn(target, scene.view)) continue;
       const dx = x - target.x - label.sx;
       const dy = y - target.y - label.sy;
       if (dx >= 0 && dy >= 0 && dx <= label.w && dy <= label.h) return target;

@@ -24,6 +24,8 @@ function shape(points, mirror) {
 const MIN_AIRCRAFT = 15;
 const MIN_VEHICLE = 8;
 const MIN_UNKNOWN = 9;
+/** A symbol whose true length reaches this is drawn at its true extent, px: smaller ones would not be told apart. */
+const TRUE_FROM = 24;
 
 /**
  * @typedef {object} SymbolLook
@@ -57,10 +59,17 @@ export function drawSymbol(context, x, y, scale, rotation, look) {
   const { kind, heading } = look;
   let points = DISC;
   let [w, h] = [11, 11];
+  // what has no nose to show is an outline at true scale, so that the video below it stays visible
+  const outline = look.length * scale >= TRUE_FROM && (kind === 'unknown' || (kind === 'aircraft' && heading === null));
   if (kind === 'vehicle') {
     h = Math.max(MIN_VEHICLE, look.length * scale);
     w = Math.max(MIN_VEHICLE * (heading === null ? 1 : 0.75), look.width * scale);
     points = BOX;
+  } else if (outline) {
+    // along the heading the extent is length by width; without one it is somewhere in the circle
+    h = look.length * scale;
+    w = heading === null ? h : look.width * scale;
+    points = heading === null ? DISC : BOX;
   } else if (kind === 'unknown') {
     h = w = Math.max(MIN_UNKNOWN, Math.min(24, Math.max(look.length, look.width) * scale * 0.7));
     points = DIAMOND;
@@ -69,8 +78,16 @@ export function drawSymbol(context, x, y, scale, rotation, look) {
     w = look.length * scale >= MIN_AIRCRAFT ? look.width * scale : h * 0.95;
     points = h > 30 ? AIRCRAFT : AIRCRAFT_SMALL;
   }
-  const turn = heading === null || kind === 'unknown' ? 0 : heading - rotation;
+  const turn = heading === null || (kind === 'unknown' && !outline) ? 0 : heading - rotation;
   trace(context, points, x, y, Math.cos(turn), Math.sin(turn), w, h);
+  if (outline) {
+    context.strokeStyle = look.ink;
+    context.lineWidth = 1.6;
+    if (look.hollow) context.setLineDash([4, 3]);
+    context.stroke();
+    context.setLineDash([]);
+    return;
+  }
   if (kind === 'unknown' || look.hollow) {
     context.fillStyle = look.halo;
     const alpha = context.globalAlpha;

@@ -20,7 +20,12 @@ import { drawSymbol, extentOf, symbolRadius } from './symbols.js';
  * @property {Map<number, 'information'|'alarm'>} alerted
  * @property {Set<number>} unacknowledged  targets of alarms nobody has acknowledged
  * @property {boolean} flashOn
+ * @property {import('../types.js').MapFeature[]} holds  the holding positions of the map
+ * @property {Set<number>} occupants  of any runway's protection area
  */
+
+/** A circle of accuracy smaller than this lies within every symbol and is not drawn, px. */
+const ACCURACY_FROM = 4;
 
 /** Bring every target to where it is now. @param {Scene} scene @param {number} nowMs */
 export function advance(scene, nowMs) {
@@ -87,6 +92,7 @@ function drawOne(context, scene, target, nowMs) {
     context.strokeStyle = theme.ink.select;
     context.lineWidth = track.id === scene.selected ? 1.6 : 1;
     corners(context, target.x, target.y, radius + (stage ? 7 : 0));
+    if (track.id === scene.selected) drawAccuracy(context, scene, target);
   }
 }
 
@@ -111,6 +117,21 @@ function drawRing(context, scene, target, radius, stage) {
     context.arc(target.x, target.y, radius + 5, 0, 2 * Math.PI);
     context.stroke();
   }
+}
+
+/**
+ * The circle that holds the position with 95 %. The feed tells the longer axis of the ellipse alone.
+ * @param {CanvasRenderingContext2D} context @param {Scene} scene @param {Target} target
+ */
+function drawAccuracy(context, scene, target) {
+  const radius = (target.track.accuracy_m ?? 0) * scene.view.scale;
+  if (radius < ACCURACY_FROM) return;
+  context.lineWidth = 1;
+  context.setLineDash([2, 3]);
+  context.beginPath();
+  context.arc(target.x, target.y, radius, 0, 2 * Math.PI);
+  context.stroke();
+  context.setLineDash([]);
 }
 
 /** @param {CanvasRenderingContext2D} context @param {number} x @param {number} y @param {number} r */

@@ -12,6 +12,7 @@ const TOPICS = ['tracks', 'alerts', 'status'];
  * @property {string} url
  * @property {(message: Record<string, any>) => void} onMessage  every message but the greetings
  * @property {(state: LinkState) => void} onState
+ * @property {() => void} [onRefused]  a connection ended before it was open
  * @property {() => {epoch: string, seq: number}|null} position  what has been taken in, to resume from
  * @property {(url: string, protocol: string) => WebSocket} [open]
  * @property {() => number} [random]
@@ -82,7 +83,9 @@ export class LiveFeed {
       return;
     }
     this.socket = socket;
+    let opened = false;
     socket.onopen = () => {
+      opened = true;
       const resume = this.options.position();
       this.send(resume ? { type: 'hello', resume } : { type: 'hello' });
     };
@@ -90,6 +93,7 @@ export class LiveFeed {
     socket.onclose = (event) => {
       if (this.socket !== socket) return;
       this.socket = null;
+      if (!opened) this.options.onRefused?.();
       this.again(event.code === 1013 ? LONGEST_WAIT_MS : undefined);
     };
     socket.onerror = () => {};

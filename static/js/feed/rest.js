@@ -17,6 +17,18 @@ async function call(path, init = {}, limitMs = 10000) {
   throw new Error(detail || `${response.status} ${response.statusText}`);
 }
 
+/**
+ * Ask why the live feed cannot be opened: a browser does not tell the answer to a WebSocket. The feed refuses the pages
+ * that may not write, and what may not write is answered by 403 before anything else is looked at.
+ * @returns {Promise<string>} '' when the page is not refused, or the service cannot be reached
+ */
+export async function fetchRefusal() {
+  const response = await fetch('api/v1/live', { method: 'POST', signal: AbortSignal.timeout(4000), credentials: 'same-origin' }).catch(() => null);
+  if (response?.status !== 403) return '';
+  const body = await response.json().catch(() => null);
+  return typeof body?.detail === 'string' ? body.detail : 'refused by a proxy (403)';
+}
+
 /** @returns {Promise<any>} the airport as GeoJSON */
 export const fetchAirport = async () => (await call('api/v1/airport.geojson', {}, 30000)).json();
 

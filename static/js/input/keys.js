@@ -29,12 +29,12 @@
 export const KEYS = [
   ['← ↑ → ↓', 'pan'], ['+ −', 'zoom'], ['q e', 'rotate'], ['n', 'north up'], ['0', 'whole airport'], ['a', 'acknowledge: alarms first, then the oldest'],
   ['v', 'speed vector'], ['h', 'history dots'], ['l', 'labels: off, short, full'], ['p', 'palette: night, day, contrast'],
-  ['r', 'radar video'], ['/', 'search a target'], ['t', 'target list'], ['m', 'measure range and bearing'], ['f', 'follow the selected target'],
+  ['r', 'radar video'], ['/', 'search a target'], ['t', 'target list, ↑ ↓ through it'], ['m', 'measure range and bearing'], ['f', 'follow the selected target'],
   ['s', 'sound on or off'], ['Tab', 'through alerts and controls'], ['Esc', 'close, deselect, end measuring'], ['?', 'this help'],
 ];
 /** @type {[string, string][]} */
 export const MOUSE = [
-  ['drag', 'pan'], ['wheel', 'zoom at the cursor'], ['Shift + drag, wheel', 'rotate'], ['click', 'select a target'],
+  ['drag', 'pan'], ['wheel', 'zoom at the cursor'], ['Shift + drag, wheel', 'rotate'], ['click', 'select a target; the dotted circle holds its position with 95 %'],
   ['drag a label', 'pin it'], ['double click a label', 'release it'],
 ];
 

@@ -40,6 +40,12 @@ export function slotOffset(slot, radius, w, h) {
   return [ux > 0 ? reach : ux < 0 ? -reach - w : -w / 2, uy > 0 ? reach : uy < 0 ? -reach - h : -h / 2];
 }
 
+/**
+ * @param {number} from where a box begins @param {number} size of it @param {number} room from 0 to here
+ * @returns {number} where it has to begin to lie in the room; at 0 when it is too big for it
+ */
+export const clampInto = (from, size, room) => Math.max(0, Math.min(from, room - size));
+
 /** Boxes on a grid of cells, so that a question costs a few comparisons. */
 class Boxes {
   constructor() {
@@ -120,11 +126,10 @@ function bestPlace(request, boxes, screen) {
   for (let slot = 0; slot < SLOTS; slot += 1) if (slot !== request.slot) order.push(slot);
   for (const slot of order) {
     const [dx, dy] = slotOffset(slot, radius, w, h);
-    const x0 = x + dx;
-    const y0 = y + dy;
+    const x0 = clampInto(x + dx, w, screen.width);
+    const y0 = clampInto(y + dy, h, screen.height);
     const covered = boxes.overlap(x0 - 2, y0 - 1, x0 + w + 2, y0 + h + 1, id);
-    const outside = Math.max(0, -x0) + Math.max(0, x0 + w - screen.width)
-      + Math.max(0, -y0) + Math.max(0, y0 + h - screen.height);
+    const outside = Math.abs(x0 - x - dx) + Math.abs(y0 - y - dy);
     const cost = covered + 6 * outside * h + (slot === request.slot ? 0 : 12 + 3 * slot);
     if (cost < bestCost) {
       best = slot;
@@ -135,5 +140,7 @@ function bestPlace(request, boxes, screen) {
   }
   const [dx, dy] = slotOffset(best, radius, w, h);
   const visible = request.must || bestOverlap < 0.12 * w * h;
-  return { id, slot: visible ? best : -1, dx, dy, visible };
+  return {
+    id, slot: visible ? best : -1, dx: clampInto(x + dx, w, screen.width) - x, dy: clampInto(y + dy, h, screen.height) - y, visible,
+  };
 }

@@ -22,7 +22,7 @@ export function matches(track, words, kind) {
 
 /** The drawer on the left. */
 export class TargetList {
-  /** @param {import('../feed/picture.js').PictureState} picture @param {{onOpen: (id: number) => void, onToggle: (open: boolean) => void}} hooks */
+  /** @param {import('../feed/picture.js').PictureState} picture @param {{onOpen: (id: number) => void, onToggle: () => void}} hooks */
   constructor(picture, hooks) {
     this.picture = picture;
     this.hooks = hooks;
@@ -35,7 +35,8 @@ export class TargetList {
     this.search.addEventListener('keydown', (event) => {
       if (event.key === 'Enter') this.openFirst();
     });
-    byId('list-close').addEventListener('click', () => hooks.onToggle(false));
+    this.rows.addEventListener('keydown', (event) => this.onKey(event));
+    byId('list-close').addEventListener('click', hooks.onToggle);
   }
 
   /** @param {boolean} open */
@@ -48,6 +49,31 @@ export class TargetList {
   focus() {
     this.search.focus();
     this.search.select();
+  }
+
+  /** Take the focus: to the selected target, else the first one, else the search. @param {number|null} selected */
+  enter(selected) {
+    this.update(selected);
+    const rows = this.buttons();
+    const row = rows.find((one) => one.getAttribute('aria-current') === 'true') ?? rows[0];
+    if (row) row.focus();
+    else this.focus();
+  }
+
+  /** @returns {HTMLElement[]} */
+  buttons() {
+    return [...this.rows.querySelectorAll('button')];
+  }
+
+  /** Up and down go through the rows. @param {KeyboardEvent} event */
+  onKey(event) {
+    const step = event.key === 'ArrowDown' ? 1 : event.key === 'ArrowUp' ? -1 : 0;
+    if (!step) return;
+    const rows = this.buttons();
+    const at = rows.indexOf(/** @type {HTMLElement} */ (document.activeElement));
+    rows[Math.min(rows.length - 1, Math.max(0, at + step))]?.focus();
+    event.preventDefault();
+    event.stopPropagation();
   }
 
   openFirst() {

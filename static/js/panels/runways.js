@@ -8,6 +8,8 @@ import { NO_COMMANDS, byId, el, keyed, setText } from './dom.js';
 /** @typedef {import('../types.js').RunwayState} RunwayState */
 
 const ARRIVAL_SOON_S = 30;
+/** How long a change of a runway can be undone with one click, s. */
+export const UNDO_S = 10;
 
 /** One card a runway. */
 export class RunwayPanel {
@@ -23,6 +25,8 @@ export class RunwayPanel {
     this.alerted = new Map();
     /** @type {HTMLElement|null} */
     this.menu = null;
+    /** @type {Map<string, {before: RunwayState, untilMs: number}>} changes that can be undone, by runway */
+    this.undoable = new Map();
     document.addEventListener('pointerdown', (event) => {
       if (this.menu && event.target instanceof Node && !this.menu.parentElement?.contains(event.target)) this.close();
     });
@@ -42,7 +46,8 @@ export class RunwayPanel {
       el('button', { class: 'runway-name', type: 'button', title: 'Show on the map', text: state.id, onclick: () => this.hooks.onOpen(state.id) }),
       el('span', { class: 'runway-chips' }),
       el('button', { class: 'runway-set', type: 'button', 'aria-haspopup': 'menu', 'aria-expanded': 'false', 'aria-label': `Set runway ${state.id}`, text: 'Set', onclick: (/** @type {Event} */ event) => this.toggle(state.id, event) }),
-      el('span', { class: 'runway-traffic' }));
+      el('span', { class: 'runway-traffic' }),
+      el('button', { class: 'runway-undo', type: 'button', hidden: true, onclick: () => this.undo(state.id) }));
   }
 
   /** @param {HTMLElement} element @param {RunwayState} state */
@@ -52,6 +57,7 @@ export class RunwayPanel {
     set.disabled = replay;
     set.title = replay ? NO_COMMANDS : '';
     if (replay && this.menu) this.close();
+    this.fillUndo(/** @type {HTMLElement} */ (element.querySelector('.runway-undo')), state.id);
     const occupants = state.occupants ?? [];
     const soon = isNumber(state.next_arrival_s) && state.next_arrival_s <= ARRIVAL_SOON_S;
     const stage = this.alerted.get(state.id);
@@ -86,12 +92,12 @@ export class RunwayPanel {
     if (open) return;
     const state = this.picture.runways.get(id);
     if (!state) return;
-    const choice = (/** @type {string} */ text, /** @type {boolean} */ current, /** @type {Record<string, unknown>} */ change) =>
-      el('button', { type: 'button', role: 'menuitemradio', 'aria-checked': String(current), text, onclick: () => this.send(id, change) });
+    const choice = (/** @type {string} */ text, /** @type {boolean} */ current, /** @type {Record<string, unknown>} */ change, asks = false) =>
+      el('button', { type: 'button', role: 'menuitemradio', 'aria-checked': String(current), text, onclick: () => (asks ? this.confirmClosing(id) : this.send(id, change)) });
     const [a, b] = id.split('/');
     const uses = [a, b].filter(Boolean).map((one) => choice(`In use ${one}`, state.open && state.in_use === one, { in_use: one }));
     this.menu = el('div', { class: 'menu', role: 'menu', 'aria-label': `Runway ${id}` },
-      choice('Open', state.open, { open: true }), choice('Closed', !state.open, { open: false }), el('hr'),
+      choice('Open', state.open, { open: true }), choice('Closed', !state.open, { open: false }, state.open), el('hr'),
       ...uses, choice('Not in use', !state.in_use, { in_use: '' }), el('hr'),
       choice('Normal visibility', state.visibility !== 'low', { visibility: 'normal' }),
       choice('Low visibility (LVP)', state.visibility === 'low', { visibility: 'low' }));
@@ -115,6 +121,41 @@ export class RunwayPanel {
     event.stopPropagation();
   }
 
+  /** Ask before a runway is closed: the menu becomes the question. @param {string} id */
+  confirmClosing(id) {
+    const question = `Close runway ${id}?`;
+    const yes = el('button', { type: 'button', role: 'menuitem', class: 'menu-danger', text: `Close runway ${id}`, onclick: () => this.send(id, { open: false }) });
+    const no = el('button', { type: 'button', role: 'menuitem', text: 'Cancel', onclick: () => this.leave() });
+    this.menu?.setAttribute('aria-label', question);
+    this.menu?.replaceChildren(el('p', { class: 'menu-question', text: `${question} Traffic on it raises alerts.` }), yes, no);
+    // an Enter too many does not close it
+    no.focus();
+  }
+
+  /** @param {HTMLElement} button @param {string} id */
+  fillUndo(button, id) {
+    const left = Math.ceil(((this.undoable.get(id)?.untilMs ?? 0) - performance.now()) / 1000);
+    if (left <= 0) this.undoable.delete(id);
+    button.hidden = left <= 0 || this.picture.mode === 'replay';
+    setText(button, `Undo (${left} s)`);
+    button.setAttribute('aria-label', `Undo the change of runway ${id}`);
+  }
+
+  /** Set a runway to what it was before the last change from here. @param {string} id */
+  undo(id) {
+    const before = this.undoable.get(id)?.before;
+    if (!before) return;
+    const { open, in_use, visibility } = before;
+    this.send(id, open ? { open, in_use: in_use ?? '', visibility } : { open, visibility }, false);
+  }
+
+  /** Close the menu and give the focus back to its button. */
+  leave() {
+    const button = this.menu?.parentElement?.querySelector('.runway-set');
+    this.close();
+    if (button instanceof HTMLElement) button.focus();
+  }
+
   close() {
     const button = this.menu?.parentElement?.querySelector('.runway-set');
     button?.setAttribute('aria-expanded', 'false');
@@ -122,13 +163,14 @@ export class RunwayPanel {
     this.menu = null;
   }
 
-  /** @param {string} id @param {Record<string, unknown>} change */
-  async send(id, change) {
-    const button = this.menu?.parentElement?.querySelector('.runway-set');
-    this.close();
-    if (button instanceof HTMLElement) button.focus();
+  /** @param {string} id @param {Record<string, unknown>} change @param {boolean} [undoable] */
+  async send(id, change, undoable = true) {
+    this.leave();
+    const before = this.picture.runways.get(id);
     try {
       const state = (await setRunway(id, change))?.runway;
+      this.undoable.delete(id);
+      if (before && undoable) this.undoable.set(id, { before, untilMs: performance.now() + 1000 * UNDO_S });
       if (state?.id === id) {
         this.picture.runways.set(id, state);
         this.picture.statusVersion += 1;

@@ -23,12 +23,16 @@ export function healthOf(nowMs, lastMessageMs, lastPictureMs, periodS, startMs =
   return 'ok';
 }
 
-/** @param {Health} health @param {number} age s, of the picture @param {string} link @returns {string} */
-function bannerText(health, age, link) {
+/**
+ * @param {Health} health @param {number} age s, of the picture @param {string} link
+ * @param {string} refusal why the service does not let this page in
+ * @returns {string}
+ */
+export function bannerText(health, age, link, refusal = '') {
   if (health === 'fault') return 'DISPLAY FAULT – part of the picture cannot be drawn, do not use it; reload the page';
   if (health === 'late') return Number.isFinite(age) ? `PICTURE LATE – no new tracks for ${Math.round(age)} s` : 'PICTURE LATE – connected, but no tracks yet';
   if (health !== 'lost') return '';
-  const again = link === 'live' ? '' : ' – reconnecting…';
+  const again = refusal ? ` – refused: ${refusal}` : link === 'live' ? '' : ' – reconnecting…';
   return Number.isFinite(age) ? `FEED LOST – this picture is ${Math.round(age)} s old, do not use it${again}` : `NO FEED – no picture${again}`;
 }
 
@@ -41,6 +45,8 @@ export class StatusBar {
     this.badge = byId('mode');
     this.startMs = performance.now();
     this.toastTimer = 0;
+    /** why the service does not let this page in, '' when it does */
+    this.refusal = '';
     /** @type {Health} */
     this.health = 'starting';
   }
@@ -65,14 +71,14 @@ export class StatusBar {
     document.body.dataset.health = health;
     document.body.dataset.mode = picture.mode;
     const starting = health === 'starting';
-    const text = bannerText(health, age, link);
+    const text = bannerText(health, age, link, this.refusal);
     this.banner.hidden = !text;
     setText(this.banner, text);
     this.banner.dataset.kind = health;
     const mode = picture.mode;
     this.badge.hidden = mode === 'live';
     setText(this.badge, mode === 'demo' ? 'DEMO · simulated' : mode === 'replay' ? 'REPLAY · not live' : mode);
-    setText(byId('link'), starting ? 'connecting' : health === 'ok' ? (replay ? 'connected' : 'live') : health);
+    setText(byId('link'), starting ? 'connecting' : health === 'ok' ? (replay ? 'connected' : 'live') : this.refusal ? 'refused' : health);
     setText(byId('count'), `${picture.targets.size} targets`);
   }
 

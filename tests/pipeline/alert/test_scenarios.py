@@ -181,7 +181,8 @@ def test_the_payload_is_complete() -> None:
     assert alert.cat004_type == 9
     assert alert.cat011_type == 1
     assert "AFR1" in alert.text
-    assert "Vehicle 3" in alert.text
+    assert "#3" in alert.text, "as on the map, without a callsign"
+    assert "Vehicle" not in alert.text
     mover, occupant = alert.targets
     assert mover.callsign == "AFR1"
     assert mover.address == "390001"

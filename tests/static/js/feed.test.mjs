@@ -5,7 +5,7 @@ import { LiveFeed } from '../../../static/js/feed/live.js';
 import { onKey } from '../../../static/js/input/keys.js';
 import { matches } from '../../../static/js/panels/list.js';
 import { drops } from '../../../static/js/panels/sensors.js';
-import { healthOf } from '../../../static/js/panels/status.js';
+import { bannerText, healthOf } from '../../../static/js/panels/status.js';
 import { DEFAULTS, Settings, next, sane, viewFromQuery, viewToQuery, VECTORS } from '../../../static/js/settings.js';
 
 class Socket {
@@ -170,4 +170,22 @@ test('of a sensor only what means loss or trouble is shown unasked', () => {
   const sensor = { id: 'a', kind: 'radar', status: 'ok', last: 0, simulated: false, detail: '', counters };
   assert.deepEqual(drops(sensor).map(([name]) => name), ['lost', 'wrong_cell_count', 'queue_dropped_blocks', 'missing_sweeps', 'no_time', 'deliver_failed']);
   assert.deepEqual(drops({ ...sensor, counters: { lost: Number.NaN } }), []);
+});
+
+test('a connection that ends before it is open may have been refused, and the banner says why', () => {
+  let refused = 0;
+  const { made, sockets } = feed();
+  made.options.onRefused = () => { refused += 1; };
+  made.start();
+  sockets[0].die();
+  assert.equal(refused, 1);
+  made.restart();
+  clearTimeout(made.timer);
+  made.connect();
+  sockets.at(-1).open();
+  sockets.at(-1).die();
+  assert.equal(refused, 1, 'a connection that was open was let in');
+  made.stop();
+  assert.match(bannerText('lost', NaN, 'waiting', 'the page comes from elsewhere'), /^NO FEED .*refused: the page comes from elsewhere/);
+  assert.match(bannerText('lost', NaN, 'waiting'), /reconnecting/);
 });

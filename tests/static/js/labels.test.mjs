@@ -3,6 +3,8 @@ import { test } from 'node:test';
 
 import { angle, bearing, clock, compact, countdown, distance, duration, knots, number } from '../../../static/js/model/format.js';
 import { labelText, nameOf, numberOf } from '../../../static/js/model/label_text.js';
+import { LabelLayer } from '../../../static/js/draw/labels.js';
+import { HOLD_REACH_M, distanceToLine } from '../../../static/js/model/holds.js';
 import { SLOTS, placeLabels, slotOffset } from '../../../static/js/model/placement.js';
 import { roundLength } from '../../../static/js/draw/overlay.js';
 
@@ -120,4 +122,36 @@ test('the scale bar is a round length that fits', () => {
     assert.ok(metres * scale <= 150 && metres * scale > 59, `${metres} at ${scale}`);
     assert.match(String(metres), /^(0\.)?0*[125]0*$/);
   }
+});
+
+test('no label is cut at an edge, however crowded it is there', () => {
+  const next = random(3);
+  for (let round = 0; round < 20; round += 1) {
+    const requests = Array.from({ length: 40 }, (_, i) => request(i + 1, 940 + 60 * next(), 200 + 60 * next(), { must: true, w: 60 + 60 * next() }));
+    for (const one of placeLabels(requests, symbolsOf(requests), screen)) {
+      const [x0, y0, x1, y1] = boxOf(one, requests);
+      assert.ok(x0 >= 0 && y0 >= 0 && x1 <= 1000.001 && y1 <= 800.001, `${x0} ${x1}`);
+    }
+  }
+});
+
+const hold = { rings: [[[100, 0], [100, 40]]] };
+const scene = { alerted: new Map(), occupants: new Set([8]), holds: [hold], selected: null, hovered: null };
+const standing = (id, east_m, more = {}) => ({ track: { ...bare, id, east_m, north_m: 20, speed_mps: 0, ...more }, label: { pinned: null } });
+
+test('what stands at a holding position, on a runway or in an alert is labelled at every scale', () => {
+  const layer = new LabelLayer();
+  const level = (target, with_ = scene) => layer.level('full', target, layer.priority(with_, target), 0.01, true);
+  assert.equal(level(standing(1, 100 - HOLD_REACH_M + 1)), 'full');
+  assert.equal(level(standing(2, 100 - HOLD_REACH_M - 1)), 'off', 'others that stand keep their names to themselves');
+  assert.equal(level(standing(3, 5000, { runway: '06/24' })), 'full');
+  assert.equal(level(standing(8, 5000)), 'full', 'in the protection area of a runway');
+  assert.equal(level(standing(4, 5000), { ...scene, alerted: new Map([[4, 'information']]) }), 'full');
+  assert.equal(layer.level('off', standing(1, 100), 60, 1, false), 'off', 'labels off are off');
+});
+
+test('the distance to a holding bar is to the line, not to its middle or its ends', () => {
+  assert.equal(distanceToLine(hold.rings[0], 110, 10), 10);
+  assert.equal(distanceToLine(hold.rings[0], 100, 70), 30);
+  assert.equal(distanceToLine([[3, 4]], 0, 0), 5);
 });
