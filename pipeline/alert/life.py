@@ -11,6 +11,9 @@ from pipeline.contracts.alert import Conflict, Situation
 from pipeline.picture import Alert, AlertTarget, Stage
 from pipeline.tables import Source, TargetClass
 
+LOOKS_KEPT = 16
+"""Looks at which a conflict was there, kept of each."""
+
 
 @dataclass(frozen=True)
 class LifeSettings:
@@ -42,15 +45,10 @@ class Case:
     addresses: tuple[str, ...]
     seen: float
     alarmed: float = -np.inf
-    looks: deque[int] = field(default_factory=lambda: deque(maxlen=16))
+    looks: deque[int] = field(default_factory=lambda: deque(maxlen=LOOKS_KEPT))
     alert: Alert | None = None
     sent: float = -np.inf
     acknowledged_stage: Stage | None = None
-
-    @property
-    def key(self) -> tuple[str, str, frozenset[int]]:
-        """What makes it the same alert: kind, runway, targets."""
-        return self.conflict.rule, self.conflict.runway, frozenset(self.conflict.tracks)
 
     def meet(self, conflict: Conflict, addresses: tuple[str, ...], clock: float, look: int) -> None:
         """The conflict is there in this look."""
@@ -70,16 +68,27 @@ class Case:
         alarm = not degraded and clock - self.alarmed < max(settings.clear_s, 1e-9)
         return "alarm" if alarm else "information"
 
-    def matches(self, conflict: Conflict, addresses: tuple[str, ...]) -> bool:
-        """The same alert although a target has a new track: each target is the same track or has the same address."""
-        mine = self.conflict
-        if (mine.rule, mine.runway, len(mine.tracks)) != (conflict.rule, conflict.runway, len(conflict.tracks)):
+    @property
+    def intruder(self) -> tuple[int | None, str]:
+        """Track and address of the intruder; None and nothing when no target is more to blame than another."""
+        return intruder_of(self.conflict, self.addresses)
+
+    def renamed(self, conflict: Conflict, addresses: tuple[str, ...]) -> bool:
+        """The same targets although one has a new track: each is the same track or has the same address."""
+        if len(self.conflict.tracks) != len(conflict.tracks):
             return False
-        known = set(mine.tracks)
+        known = set(self.conflict.tracks)
         named = {one for one in self.addresses if one}
         return all(
             track in known or address in named for track, address in zip(conflict.tracks, addresses, strict=True)
         )
+
+
+def intruder_of(conflict: Conflict, addresses: tuple[str, ...]) -> tuple[int | None, str]:
+    """Track and address of a conflict's intruder. addresses: of its tracks, in their order."""
+    if conflict.intruder is None:
+        return None, ""
+    return conflict.intruder, addresses[conflict.tracks.index(conflict.intruder)]
 
 
 def write_alert(case: Case, situation: Situation, rows: dict[int, int], stage: Stage, former: Alert) -> Alert:
@@ -99,6 +108,7 @@ def write_alert(case: Case, situation: Situation, rows: dict[int, int], stage: S
     runway = situation.runways[situation.frames.ids.index(conflict.runway)]
     return replace(
         former,
+        rule=conflict.rule,
         stage=stage,
         text=conflict.text + (" (surveillance degraded)" if situation.degraded else ""),
         updated_at=situation.time,

@@ -13,7 +13,8 @@ import numpy as np
 from pipeline.airport.model import Airport
 from pipeline.airport.runway_frames import HoldFrames, RunwayFrames
 from pipeline.alert.life import Case, LifeSettings, write_alert
-from pipeline.contracts.alert import AlertRule, Conflict, Entry, Situation, SituationSettings
+from pipeline.alert.merge import find_case, merge
+from pipeline.contracts.alert import AlertRule, Entry, Situation, SituationSettings
 from pipeline.picture import Alert, AlertChange, RunwayState, Visibility
 from pipeline.sites import NodeSite
 from pipeline.situation.holds import HoldMemory, HoldSettings, watch_holds
@@ -171,12 +172,14 @@ class AlertMonitor:
         situation = self._observe(tracks, time, sensors_degraded, node_events)
         self._note_use(situation)
         addresses = {int(n): str(a) for n, a in zip(tracks.id, tracks.address, strict=True)}
-        for conflict in self._conflicts(situation):
+        met: list[Case] = []
+        for conflict in merge(situation, [one for rule in self._rules for one in rule(situation)]):
             named = tuple(addresses.get(track, "") for track in conflict.tracks)
-            case = self._find(conflict, named)
+            case = find_case(state.cases, conflict, named, met)
             if case is None:
                 case = Case(conflict, named, state.clock)
                 state.cases.append(case)
+            met.append(case)
             case.meet(conflict, named, state.clock, state.look)
         return tuple(self._lead(situation, {n: row for row, n in enumerate(addresses)}))
 
@@ -258,20 +261,6 @@ class AlertMonitor:
                 next_arrival_s=None if first is None else float(times[first]),
             )
 
-    def _conflicts(self, situation: Situation) -> list[Conflict]:
-        found: dict[Any, Conflict] = {}
-        for rule in self._rules:
-            for one in rule(situation):
-                key = (one.rule, one.runway, frozenset(one.tracks))
-                if key not in found or (one.stage == "alarm" and found[key].stage != "alarm"):
-                    found[key] = one
-        return list(found.values())
-
-    def _find(self, conflict: Conflict, addresses: tuple[str, ...]) -> Case | None:
-        key = (conflict.rule, conflict.runway, frozenset(conflict.tracks))
-        same = [case for case in self._state.cases if case.key == key]
-        return next(iter(same or [case for case in self._state.cases if case.matches(conflict, addresses)]), None)
-
     def _lead(self, s: Situation, rows: dict[int, int]) -> list[AlertChange]:
         state, life = self._state, self._life
         changes: list[AlertChange] = []
@@ -304,7 +293,7 @@ class AlertMonitor:
         alert = replace(alert, aural=alert.state != "acknowledged")
         case.alert = alert
         changed = (
-            alert.stage != former.stage
+            (alert.stage, alert.rule) != (former.stage, former.rule)
             or alert.degraded != former.degraded
             or [t.track for t in alert.targets] != [t.track for t in former.targets]
         )

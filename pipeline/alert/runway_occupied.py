@@ -96,7 +96,7 @@ class RunwayOccupied(RuleSettings):
                 row,
                 other,
                 stage=stage if inside else "information",
-                text=f"{s.label(row)} {'landed' if s.landed[row] else 'rolling'} {s.designator(r, row)}, "
+                text=f"{s.label(row)} {s.doing(r, row)} {s.designator(r, row)}, "
                 f"{s.label(other)} {gap:.0f} m ahead "
                 f"{'on' if s.on_strip[r, other] else 'near' if inside else 'entering'} runway {s.frames.ids[r]}",
                 certain=bool(s.certain[row] and s.certain[other] and inside),
@@ -126,6 +126,7 @@ class RunwayOccupied(RuleSettings):
             rule="runway_occupied",
             runway=s.frames.ids[r],
             tracks=track_ids(s, row, other),
+            intruder=int(s.tracks.id[other]),
             holding_point=None if entry is None else s.holds.names[entry.hold],
             parameter_set=parameters,
             cat004_type=type,

@@ -128,6 +128,14 @@ class Situation:
         """The direction in which the row uses the runway: "24"."""
         return self.frames.designators[runway][int(self.way[runway, row])]
 
+    def doing(self, runway: int, row: int) -> str:
+        """What somebody who uses the runway does, in one word for all texts."""
+        if self.arrival[runway, row]:
+            return "landing"
+        if self.landed[row]:
+            return "landed"
+        return "departing" if self.outbound[runway, row] else "rolling"
+
     def label(self, row: int) -> str:
         """What a controller would call the target."""
         callsign = str(self.tracks.callsign[row]).strip()
@@ -144,7 +152,8 @@ class Situation:
 class Conflict:
     """One dangerous constellation, as seen in one situation. Times s, lengths m, (east, north) m.
 
-    tracks: ids of tracks, the moving one first. certain: no need to see it again before the alert is raised.
+    tracks: ids of tracks, the moving one first. intruder: which of them is where it must not be; None when none is
+    more so than another, as with opposite directions. certain: no need to see it again before the alert is raised.
     cat004_type: message type of ASTERIX CAT004. cat011_type: alert type of CAT011 I600 (free; see each rule).
     """
 
@@ -153,6 +162,7 @@ class Conflict:
     tracks: tuple[int, ...]
     stage: Stage
     text: str
+    intruder: int | None = None
     certain: bool = False
     holding_point: str | None = None
     time_to_threshold: float | None = None

@@ -70,7 +70,7 @@ def test_vehicle_passes_a_holding_position_with_an_arrival_on_final() -> None:
 
 def test_vehicle_passes_a_holding_position_with_a_departure_rolling() -> None:
     van = Mover(3, [(0, 0, -300), (110, 0, -100), (122, 0, -30), (300, 0, -30)], TargetClass.VEHICLE)
-    played = play(monitor(), [departure(2, 100), van], 0, 140)
+    played = play(monitor(rules=RULES[1:2]), [departure(2, 100), van], 0, 140)
     assert first(played, "hold_entry", "alarm") <= 115
 
 
