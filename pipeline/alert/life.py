@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Container
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,8 +20,9 @@ LOOKS_KEPT = 16
 class LifeSettings:
     """raise_hits of raise_looks looks raise an alert that is not certain; looks closer than look_s count as one.
 
-    clear_s: an alert is lowered or cleared after so long without reason. lost_s: the same when a target has been lost,
-    which is no proof that the danger is over. refresh_s: a live alert's payload is sent again after so long.
+    clear_s: an alert is lowered or cleared after so long without reason. lost_s: an alarm is lowered, and any alert
+    cleared, after so long when a target has been lost, which is no proof that the danger is over. refresh_s: a live
+    alert's payload is sent again after so long.
     most: live alerts at most; alarms push out information, and what is held back is counted.
     """
 
@@ -39,7 +41,10 @@ class LifeSettings:
 
 @dataclass
 class Case:
-    """A conflict that is being watched, with its alert once that is raised. Times are on the monitor's own clock."""
+    """A conflict that is being watched, with its alert once that is raised. Times are on the monitor's own clock.
+
+    alarmed: when the last look called for an alarm; alarm_tracks: the targets that it named.
+    """
 
     conflict: Conflict
     addresses: tuple[str, ...]
@@ -49,12 +54,13 @@ class Case:
     alert: Alert | None = None
     sent: float = -np.inf
     acknowledged_stage: Stage | None = None
+    alarm_tracks: tuple[int, ...] = ()
 
     def meet(self, conflict: Conflict, addresses: tuple[str, ...], clock: float, look: int) -> None:
         """The conflict is there in this look."""
         self.conflict, self.addresses, self.seen = conflict, addresses, clock
         if conflict.stage == "alarm":
-            self.alarmed = clock
+            self.alarmed, self.alarm_tracks = clock, conflict.tracks
         if not self.looks or self.looks[-1] != look:
             self.looks.append(look)
 
@@ -63,9 +69,14 @@ class Case:
         recent = sum(1 for one in self.looks if one > look - settings.raise_looks)
         return self.conflict.certain or recent >= settings.raise_hits
 
-    def stage(self, clock: float, degraded: bool, settings: LifeSettings) -> Stage:
-        """Alarm as soon as one look says so, and until `clear_s` after the last that did; never on degraded sensors."""
-        alarm = not degraded and clock - self.alarmed < max(settings.clear_s, 1e-9)
+    def stage(self, clock: float, degraded: bool, present: Container[int], settings: LifeSettings) -> Stage:
+        """Alarm as soon as one look says so, and until `clear_s` after the last that did; never on degraded sensors.
+
+        Until `lost_s` when a target that the alarm named is not among those present. A loss raises nothing again.
+        """
+        lost = any(track not in present for track in self.alarm_tracks)
+        still = lost and self.alert is not None and self.alert.stage == "alarm"
+        alarm = not degraded and clock - self.alarmed < max(settings.lost_s if still else settings.clear_s, 1e-9)
         return "alarm" if alarm else "information"
 
     @property
@@ -110,6 +121,7 @@ def write_alert(case: Case, situation: Situation, rows: dict[int, int], stage: S
         former,
         rule=conflict.rule,
         stage=stage,
+        worst_stage="alarm" if stage == "alarm" else former.worst_stage,
         text=conflict.text + (" (surveillance degraded)" if situation.degraded else ""),
         updated_at=situation.time,
         targets=tuple(targets),

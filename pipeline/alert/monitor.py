@@ -283,13 +283,13 @@ class AlertMonitor:
     def _renew(self, case: Case, s: Situation, rows: dict[int, int]) -> list[AlertChange]:
         state, former = self._state, case.alert
         assert former is not None
-        stage = case.stage(state.clock, s.degraded, self._life)
+        stage = case.stage(state.clock, s.degraded, rows, self._life)
         alert = write_alert(case, s, rows, stage, former)
         if alert.state == "new":
             alert = replace(alert, state="ongoing")
         if stage == "alarm" and former.stage != "alarm" and case.acknowledged_stage != "alarm":
-            # what was acknowledged was less than this
-            alert = replace(alert, state="ongoing", acknowledged_at=None, acknowledged_by=None)
+            # what was acknowledged was less than this; who did so stays on record
+            alert = replace(alert, state="ongoing")
         alert = replace(alert, aural=alert.state != "acknowledged")
         case.alert = alert
         changed = (
@@ -321,7 +321,7 @@ class AlertMonitor:
                     continue
                 changes.append(self._clear(yielding, s.time, "displaced by an alarm"))
                 state.cases.remove(yielding)
-            stage = case.stage(state.clock, s.degraded, life)
+            stage = case.stage(state.clock, s.degraded, rows, life)
             blank = Alert(
                 id=state.next_id,
                 rule=case.conflict.rule,
