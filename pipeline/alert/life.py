@@ -23,7 +23,8 @@ class LifeSettings:
     clear_s: an alert is lowered or cleared after so long without reason. lost_s: an alarm is lowered, and any alert
     cleared, after so long when a target has been lost, which is no proof that the danger is over. refresh_s: a live
     alert's payload is sent again after so long.
-    most: live alerts at most; alarms push out information, and what is held back is counted.
+    most: live alerts at most; alarms push out information, and what is held back is counted. Raises ValueError for
+    settings with which no alert could be raised.
     """
 
     raise_hits: int = 2
@@ -35,6 +36,8 @@ class LifeSettings:
     most: int = 64
 
     def __post_init__(self) -> None:
+        if self.raise_hits > LOOKS_KEPT:
+            raise ValueError(f"raise_hits is at most {LOOKS_KEPT}, the looks that are kept")
         if not 1 <= self.raise_hits <= self.raise_looks or self.most < 1:
             raise ValueError("1 <= raise_hits <= raise_looks and most >= 1 wanted")
 

@@ -67,6 +67,22 @@ def test_one_look_in_three_is_not_enough() -> None:
         assert bench.step() == []
 
 
+def test_settings_with_which_nothing_could_be_raised_are_refused() -> None:
+    with pytest.raises(ValueError, match="at most 16"):
+        LifeSettings(raise_hits=17, raise_looks=20)
+    with pytest.raises(ValueError, match="raise_hits <= raise_looks"):
+        LifeSettings(raise_hits=4)
+    with pytest.raises(ValueError, match="most"):
+        LifeSettings(most=0)
+
+
+def test_the_most_hits_that_may_be_asked_for_raise_an_alert() -> None:
+    bench = Bench(raise_hits=16, raise_looks=16)
+    for _ in range(15):
+        assert bench.step(conflict()) == []
+    assert bench.step(conflict()) == ["raise information"]
+
+
 def test_many_updates_within_one_look_count_once() -> None:
     bench = Bench()
     bench.step()
