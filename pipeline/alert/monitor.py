@@ -19,6 +19,7 @@ from pipeline.picture import Alert, AlertChange, RunwayState, Visibility
 from pipeline.sites import NodeSite
 from pipeline.situation.holds import HoldMemory, HoldSettings, watch_holds
 from pipeline.situation.observe import observe
+from pipeline.situation.pairs import Pair, watch_pairs
 from pipeline.tables import NodeEvents, Tracks
 
 
@@ -36,6 +37,7 @@ class MonitorState:
     cleared: deque[Alert] = field(default_factory=lambda: deque(maxlen=256))
     landed: dict[int, float] = field(default_factory=dict)
     holds: HoldMemory = field(default_factory=HoldMemory)
+    pairs: dict[tuple[int, int], Pair] = field(default_factory=dict)
     held_back: int = 0
     held_back_total: int = 0
 
@@ -222,7 +224,8 @@ class AlertMonitor:
         )
         rows = {int(n): row for row, n in enumerate(tracks.id)}
         entries = {rows[n]: entry for n, entry in state.holds.entries.items() if n in rows}
-        return replace(situation, entries={row: e for row, e in entries.items() if self._serious(situation, row, e)})
+        serious = {row: e for row, e in entries.items() if self._serious(situation, row, e)}
+        return replace(situation, entries=serious, airframes=watch_pairs(state.pairs, situation, state.clock))
 
     def _serious(self, s: Situation, row: int, entry: Entry) -> bool:
         runway = int(self._hold_frames.runway[entry.hold])
