@@ -150,6 +150,7 @@ class Wire:
             "id": alert.id,
             "rule": alert.rule,
             "stage": alert.stage,
+            "worst_stage": alert.worst_stage,
             "state": alert.state,
             "text": alert.text,
             "raised_at": alert.raised_at,

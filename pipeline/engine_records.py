@@ -20,6 +20,7 @@ from pipeline.inputs import (
 )
 from pipeline.picture import Alert, AlertChange, AlertTarget, RunwayState, SensorState
 from pipeline.situation.holds import HoldMemory
+from pipeline.situation.pairs import Pair
 from pipeline.tables import SectorPlots, Sweeps, Tracks
 from pipeline.tables.arrays import Array, Floats
 from pipeline.track.false_plots import FalsePlots
@@ -70,7 +71,7 @@ CODEC = ValueCodec(
         Envelope, SectorPlots, Tick, ClockStep, SensorHealth, PartsChanged, Acknowledge, SetRunway,
         Shown, Alert, AlertTarget, AlertChange, RunwayState, SensorState,
         EngineState, RadarClock, FalsePlots, TrackNumbers, Latencies, MonitorState, Case, Conflict, HoldMemory, Entry,
-        ChainBlock, ChainState, Sweeps,
+        Pair, ChainBlock, ChainState, Sweeps,
     )
 )  # fmt: skip
 """Knows every class that a journal holds, and no other."""

@@ -34,7 +34,11 @@ class AlertTarget:
 
 @dataclass(frozen=True)
 class Alert:
-    """One runway alert with the fields of CAT004, CAT011 and the operators' displays. Times UTC s, lengths m."""
+    """One runway alert with the fields of CAT004, CAT011 and the operators' displays. Times UTC s, lengths m.
+
+    worst_stage: the gravest stage that it ever had. acknowledged_at, acknowledged_by: of the last acknowledgement; they
+    stay when the alert escalates and asks for another one.
+    """
 
     id: int
     rule: str
@@ -64,6 +68,7 @@ class Alert:
     simulated: bool = False
     cat004_type: int = 0
     cat011_type: int = 0
+    worst_stage: Stage = "information"
 
 
 @dataclass(frozen=True)

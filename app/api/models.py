@@ -116,6 +116,7 @@ class Alert(Model):
     id: int
     rule: str
     stage: StageName
+    worst_stage: StageName | None = Field(None, description="the gravest it had; null in alerts of earlier versions")
     state: StateName
     text: str
     raised_at: Seconds
@@ -127,7 +128,7 @@ class Alert(Model):
     cleared_at: Seconds | None
     clear_reason: str | None
     acknowledged_at: Seconds | None
-    acknowledged_by: str | None
+    acknowledged_by: str | None = Field(description="stays when the alert escalates and has to be acknowledged again")
     time_to_threshold_s: float | None
     distance_to_threshold_m: float | None
     time_to_conflict_s: float | None

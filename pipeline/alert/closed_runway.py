@@ -59,6 +59,7 @@ def _conflict(s: Situation, r: int, row: int, stage: Stage, text: str, parameter
         rule="closed_runway",
         runway=s.frames.ids[r],
         tracks=track_ids(s, row),
+        intruder=int(s.tracks.id[row]),
         stage=stage,
         text=text,
         certain=bool(s.certain[row]),

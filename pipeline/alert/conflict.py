@@ -86,6 +86,11 @@ def approach_fields(situation: Situation, runway: int, row: int) -> dict[str, An
     }
 
 
+def label_of(situation: Situation, track: int) -> str:
+    """What a controller would call the track with this id."""
+    return situation.label(int(np.nonzero(situation.tracks.id == track)[0][0]))
+
+
 def track_ids(situation: Situation, *rows: int) -> tuple[int, ...]:
     """The ids of the tracks in these rows."""
     return tuple(int(situation.tracks.id[row]) for row in rows)

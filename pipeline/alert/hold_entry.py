@@ -60,16 +60,17 @@ class HoldEntry(RuleSettings):
             stage = stage_of(time, times)
             if stage is None or other == row or s.together(row, int(other)):
                 continue
-            doing = "landing" if s.arrival[r, other] else "rolling"
+            when = f" in {time:.0f} s" if s.arrival[r, other] else f", there in {time:.0f} s"
             found.append(
                 self._conflict(
                     s,
                     r,
                     entry,
                     tracks=track_ids(s, row, int(other)),
+                    intruder=int(s.tracks.id[row]),
                     stage=stage,
-                    text=f"{s.label(row)} passed {s.holds.names[entry.hold]}, {s.label(int(other))} {doing} "
-                    f"{s.designator(r, int(other))} in {time:.0f} s",
+                    text=f"{s.label(row)} passed {s.holds.names[entry.hold]}, {s.label(int(other))} "
+                    f"{s.doing(r, int(other))} {s.designator(r, int(other))}{when}",
                     certain=bool(s.certain[other] and (entry.node or s.certain[row])),
                     parameter_set=parameters,
                     cat004_type=CAT004_CROSSING,
@@ -86,6 +87,7 @@ class HoldEntry(RuleSettings):
                     r,
                     entry,
                     tracks=track_ids(s, row),
+                    intruder=int(s.tracks.id[row]),
                     stage="information",
                     text=text,
                     certain=bool(entry.node),

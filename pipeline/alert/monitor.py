@@ -13,11 +13,13 @@ import numpy as np
 from pipeline.airport.model import Airport
 from pipeline.airport.runway_frames import HoldFrames, RunwayFrames
 from pipeline.alert.life import Case, LifeSettings, write_alert
-from pipeline.contracts.alert import AlertRule, Conflict, Entry, Situation, SituationSettings
+from pipeline.alert.merge import find_case, merge
+from pipeline.contracts.alert import AlertRule, Entry, Situation, SituationSettings
 from pipeline.picture import Alert, AlertChange, RunwayState, Visibility
 from pipeline.sites import NodeSite
 from pipeline.situation.holds import HoldMemory, HoldSettings, watch_holds
 from pipeline.situation.observe import observe
+from pipeline.situation.pairs import Pair, watch_pairs
 from pipeline.tables import NodeEvents, Tracks
 
 
@@ -35,6 +37,7 @@ class MonitorState:
     cleared: deque[Alert] = field(default_factory=lambda: deque(maxlen=256))
     landed: dict[int, float] = field(default_factory=dict)
     holds: HoldMemory = field(default_factory=HoldMemory)
+    pairs: dict[tuple[int, int], Pair] = field(default_factory=dict)
     held_back: int = 0
     held_back_total: int = 0
 
@@ -171,12 +174,14 @@ class AlertMonitor:
         situation = self._observe(tracks, time, sensors_degraded, node_events)
         self._note_use(situation)
         addresses = {int(n): str(a) for n, a in zip(tracks.id, tracks.address, strict=True)}
-        for conflict in self._conflicts(situation):
+        met: list[Case] = []
+        for conflict in merge(situation, [one for rule in self._rules for one in rule(situation)]):
             named = tuple(addresses.get(track, "") for track in conflict.tracks)
-            case = self._find(conflict, named)
+            case = find_case(state.cases, conflict, named, met)
             if case is None:
                 case = Case(conflict, named, state.clock)
                 state.cases.append(case)
+            met.append(case)
             case.meet(conflict, named, state.clock, state.look)
         return tuple(self._lead(situation, {n: row for row, n in enumerate(addresses)}))
 
@@ -219,7 +224,8 @@ class AlertMonitor:
         )
         rows = {int(n): row for row, n in enumerate(tracks.id)}
         entries = {rows[n]: entry for n, entry in state.holds.entries.items() if n in rows}
-        return replace(situation, entries={row: e for row, e in entries.items() if self._serious(situation, row, e)})
+        serious = {row: e for row, e in entries.items() if self._serious(situation, row, e)}
+        return replace(situation, entries=serious, airframes=watch_pairs(state.pairs, situation, state.clock))
 
     def _serious(self, s: Situation, row: int, entry: Entry) -> bool:
         runway = int(self._hold_frames.runway[entry.hold])
@@ -258,20 +264,6 @@ class AlertMonitor:
                 next_arrival_s=None if first is None else float(times[first]),
             )
 
-    def _conflicts(self, situation: Situation) -> list[Conflict]:
-        found: dict[Any, Conflict] = {}
-        for rule in self._rules:
-            for one in rule(situation):
-                key = (one.rule, one.runway, frozenset(one.tracks))
-                if key not in found or (one.stage == "alarm" and found[key].stage != "alarm"):
-                    found[key] = one
-        return list(found.values())
-
-    def _find(self, conflict: Conflict, addresses: tuple[str, ...]) -> Case | None:
-        key = (conflict.rule, conflict.runway, frozenset(conflict.tracks))
-        same = [case for case in self._state.cases if case.key == key]
-        return next(iter(same or [case for case in self._state.cases if case.matches(conflict, addresses)]), None)
-
     def _lead(self, s: Situation, rows: dict[int, int]) -> list[AlertChange]:
         state, life = self._state, self._life
         changes: list[AlertChange] = []
@@ -294,17 +286,17 @@ class AlertMonitor:
     def _renew(self, case: Case, s: Situation, rows: dict[int, int]) -> list[AlertChange]:
         state, former = self._state, case.alert
         assert former is not None
-        stage = case.stage(state.clock, s.degraded, self._life)
+        stage = case.stage(state.clock, s.degraded, rows, self._life)
         alert = write_alert(case, s, rows, stage, former)
         if alert.state == "new":
             alert = replace(alert, state="ongoing")
         if stage == "alarm" and former.stage != "alarm" and case.acknowledged_stage != "alarm":
-            # what was acknowledged was less than this
-            alert = replace(alert, state="ongoing", acknowledged_at=None, acknowledged_by=None)
+            # what was acknowledged was less than this; who did so stays on record
+            alert = replace(alert, state="ongoing")
         alert = replace(alert, aural=alert.state != "acknowledged")
         case.alert = alert
         changed = (
-            alert.stage != former.stage
+            (alert.stage, alert.rule) != (former.stage, former.rule)
             or alert.degraded != former.degraded
             or [t.track for t in alert.targets] != [t.track for t in former.targets]
         )
@@ -332,7 +324,7 @@ class AlertMonitor:
                     continue
                 changes.append(self._clear(yielding, s.time, "displaced by an alarm"))
                 state.cases.remove(yielding)
-            stage = case.stage(state.clock, s.degraded, life)
+            stage = case.stage(state.clock, s.degraded, rows, life)
             blank = Alert(
                 id=state.next_id,
                 rule=case.conflict.rule,

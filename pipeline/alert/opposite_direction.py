@@ -60,7 +60,7 @@ class OppositeDirection(RuleSettings):
             return None
         # the one on final first; its time to threshold goes into the payload
         first, second = (other, one) if s.arrival[r, other] and not s.arrival[r, one] else (one, other)
-        names = " and ".join(f"{s.label(row)} {_doing(s, r, row)} {s.designator(r, row)}" for row in (first, second))
+        names = " and ".join(f"{s.label(row)} {s.doing(r, row)} {s.designator(r, row)}" for row in (first, second))
         fields = closest_approach(s, first, second) | {"time_to_conflict": gap / closing}
         return Conflict(
             rule="opposite_direction",
@@ -75,12 +75,6 @@ class OppositeDirection(RuleSettings):
             **approach_fields(s, r, first),
             **fields,
         )
-
-
-def _doing(s: Situation, r: int, row: int) -> str:
-    if s.arrival[r, row]:
-        return "landing"
-    return "landed" if s.landed[row] else "departing"
 
 
 PART = OppositeDirection

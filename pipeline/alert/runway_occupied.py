@@ -21,8 +21,9 @@ class RunwayOccupied(RuleSettings):
 
     departure_information_s, departure_alarm_s: the stages for a departure, in any visibility (it must abort early).
     departure_acceleration: m/s^2 that a departure is expected to gain. anticipate: who rolls ahead of the arrival does
-    not count before the alarm stage, and a departure faster than lead_speed (m/s) not at all. predicted: who cannot
-    stop before the area counts, as information. nearest: at most so many occupants are reported for one mover.
+    not count before the alarm stage, and a departure faster than lead_speed (m/s) not at all, unless the arrival still
+    gains on it. predicted: who cannot stop before the area counts, as information. nearest: at most so many occupants
+    are reported for one mover.
     """
 
     departure_acceleration: float = 1.5
@@ -57,7 +58,8 @@ class RunwayOccupied(RuleSettings):
             return
         for other in self._ahead(s, r, row, present):
             rolls_ahead = s.rolling[r, other] and s.way[r, other] == s.way[r, row]
-            leads = not s.landed[other] and s.speed[other] >= self.lead_speed
+            drawing_away = _closing_speed(s, r, row, other) <= s.settings.together_speed
+            leads = not s.landed[other] and s.speed[other] >= self.lead_speed and drawing_away
             if rolls_ahead and self.anticipate and (stage != "alarm" or leads):
                 continue
             inside = bool(s.occupant[r, other])
@@ -78,14 +80,14 @@ class RunwayOccupied(RuleSettings):
         self, s: Situation, r: int, row: int, present: Any, times: tuple[float, float], parameters: str
     ) -> Iterator[Conflict]:
         forward = s.forward(r, row)
-        own = abs(float(s.speed_along[r, row]))
         for other in self._ahead(s, r, row, present):
-            theirs = float(s.speed_along[r, other]) * forward
-            if s.rolling[r, other] and (theirs < 0 or theirs >= own - s.settings.together_speed):
+            closing = _closing_speed(s, r, row, other)
+            opposite = s.way[r, other] != s.way[r, row]
+            if s.rolling[r, other] and (opposite or closing <= s.settings.together_speed):
                 continue  # the opposite direction has its own rule; who draws away is no danger
             gap = float(s.along[r, other] - s.along[r, row]) * forward
             landed = bool(s.landed[row])
-            time = self._time_to_reach(gap, own - theirs, landed)
+            time = self._time_to_reach(gap, closing, landed)
             stage = stage_of(time, times if landed else (self.departure_information_s, self.departure_alarm_s))
             if stage is None:
                 continue
@@ -96,7 +98,7 @@ class RunwayOccupied(RuleSettings):
                 row,
                 other,
                 stage=stage if inside else "information",
-                text=f"{s.label(row)} {'landed' if s.landed[row] else 'rolling'} {s.designator(r, row)}, "
+                text=f"{s.label(row)} {s.doing(r, row)} {s.designator(r, row)}, "
                 f"{s.label(other)} {gap:.0f} m ahead "
                 f"{'on' if s.on_strip[r, other] else 'near' if inside else 'entering'} runway {s.frames.ids[r]}",
                 certain=bool(s.certain[row] and s.certain[other] and inside),
@@ -126,6 +128,7 @@ class RunwayOccupied(RuleSettings):
             rule="runway_occupied",
             runway=s.frames.ids[r],
             tracks=track_ids(s, row, other),
+            intruder=int(s.tracks.id[other]),
             holding_point=None if entry is None else s.holds.names[entry.hold],
             parameter_set=parameters,
             cat004_type=type,
@@ -134,6 +137,11 @@ class RunwayOccupied(RuleSettings):
             **closest_approach(s, row, other),
             **rest,
         )
+
+
+def _closing_speed(s: Situation, r: int, row: int, other: int) -> float:
+    """m/s at which `row` gains on `other` ahead of it along the runway."""
+    return abs(float(s.speed_along[r, row])) - float(s.speed_along[r, other]) * s.forward(r, row)
 
 
 PART = RunwayOccupied

@@ -28,9 +28,13 @@ class SituationSettings:
     over the runway is not on it. vacating_speed: m/s away from the centreline. margin_m, margin_sd, margin_most_m: how
     deep in the protection area a target must be, at least and in standard deviations of its position, and at most.
     braking: m/s^2 that a mobile could brake with before the area. together_m, together_speed: a pair so close with so
-    little relative speed is a tow, an escort or one target seen twice. lead_s: a fast track is carried on to the time
-    of the picture by at most this. mover_hits, mover_sd: a track counts as arriving or rolling only after so many
-    measurements, and when its speed is so many standard deviations: new tracks have wild speeds.
+    little relative speed is a tow, an escort or one target seen twice. echo_s, echo_m, echo_share: so is a track
+    without address and callsign, until it is so old, beside one that has them, so near and with a relative speed of at
+    most this share of the other's. airframe_s, airframe_lag_s, airframe_kept_s: so are two that have landed or rolled
+    together for so long, no further apart than together_m and so many seconds of way, and for so long after. lead_s: a
+    fast track is carried on to the time of the picture by at most this. mover_hits, mover_sd: a track counts as
+    arriving or rolling only after so many measurements, and when its speed is so many standard deviations: new tracks
+    have wild speeds.
     """
 
     arrival_speed: float = 25.0
@@ -52,6 +56,12 @@ class SituationSettings:
     braking: float = 2.5
     together_m: float = 60.0
     together_speed: float = 4.0
+    echo_s: float = 3.0
+    echo_m: float = 120.0
+    echo_share: float = 0.4
+    airframe_s: float = 5.0
+    airframe_lag_s: float = 1.0
+    airframe_kept_s: float = 20.0
     lead_s: float = 2.0
     mover_hits: int = 4
     mover_sd: float = 3.0
@@ -78,6 +88,7 @@ class Situation:
     final. time_to_threshold, distance_to_threshold: s and m, nan where not an arrival. rolling: fast along the strip,
     taking off or landing. outbound: flying off the far end. vacating: leaving the area. occupant: on the runway or in
     its area. entering: outside, and too fast to stop before the area. entries: row -> passed holding position.
+    airframes: pairs of ids, the smaller first, that are one airframe seen twice.
     """
 
     airport: Airport
@@ -111,14 +122,31 @@ class Situation:
     occupant: Array
     entering: Array
     entries: Mapping[int, Entry]
+    airframes: frozenset[tuple[int, int]] = frozenset()
 
     def together(self, one: int, other: int) -> bool:
         """Two rows are a tow, an escort, or one target seen twice."""
         if self.tracks.address[one] and self.tracks.address[one] == self.tracks.address[other]:
             return True
-        near = float(np.hypot(*(self.position[one] - self.position[other]))) < self.settings.together_m
-        slow = float(np.hypot(*(self.velocity[one] - self.velocity[other]))) < self.settings.together_speed
-        return near and slow
+        first, second = sorted((int(self.tracks.id[one]), int(self.tracks.id[other])))
+        if (first, second) in self.airframes:
+            return True
+        apart = float(np.hypot(*(self.position[one] - self.position[other])))
+        relative = float(np.hypot(*(self.velocity[one] - self.velocity[other])))
+        if apart < self.settings.together_m and relative < self.settings.together_speed:
+            return True
+        return any(self._echo(*pair, apart, relative) for pair in ((one, other), (other, one)))
+
+    def _echo(self, row: int, of: int, apart: float, relative: float) -> bool:
+        """A row is so new, near and alike in motion that it may be an echo of another, which is named."""
+        s = self.settings
+        young = self.time - float(self.tracks.born[row]) < s.echo_s
+        if not young or self._named(row) or not self._named(of):
+            return False
+        return apart < s.echo_m and relative <= s.echo_share * float(self.speed[of])
+
+    def _named(self, row: int) -> bool:
+        return bool(self.tracks.address[row] or str(self.tracks.callsign[row]).strip())
 
     def forward(self, runway: int, row: int) -> float:
         """+1 when the row moves along the centreline, -1 when against it."""
@@ -127,6 +155,14 @@ class Situation:
     def designator(self, runway: int, row: int) -> str:
         """The direction in which the row uses the runway: "24"."""
         return self.frames.designators[runway][int(self.way[runway, row])]
+
+    def doing(self, runway: int, row: int) -> str:
+        """What somebody who uses the runway does, in one word for all texts."""
+        if self.arrival[runway, row]:
+            return "landing"
+        if self.landed[row]:
+            return "landed"
+        return "departing" if self.outbound[runway, row] else "rolling"
 
     def label(self, row: int) -> str:
         """What a controller calls the target, as the displays do: "AFR123", or "#17" where it has no callsign."""
@@ -142,7 +178,8 @@ class Situation:
 class Conflict:
     """One dangerous constellation, as seen in one situation. Times s, lengths m, (east, north) m.
 
-    tracks: ids of tracks, the moving one first. certain: no need to see it again before the alert is raised.
+    tracks: ids of tracks, the moving one first. intruder: which of them is where it must not be; None when none is
+    more so than another, as with opposite directions. certain: no need to see it again before the alert is raised.
     cat004_type: message type of ASTERIX CAT004. cat011_type: alert type of CAT011 I600 (free; see each rule).
     """
 
@@ -151,6 +188,7 @@ class Conflict:
     tracks: tuple[int, ...]
     stage: Stage
     text: str
+    intruder: int | None = None
     certain: bool = False
     holding_point: str | None = None
     time_to_threshold: float | None = None

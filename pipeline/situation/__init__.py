@@ -1,1 +1,1 @@
-"""The situation on the runways: who is where, and who has passed a holding position; computed once for all rules."""
+"""The situation on the runways: who is where, who has passed a holding position, who is seen twice; for all rules."""

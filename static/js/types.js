@@ -43,6 +43,7 @@
  * @property {number} id
  * @property {string} rule
  * @property {'information'|'alarm'} stage
+ * @property {'information'|'alarm'|null} [worst_stage] the gravest that it ever had
  * @property {'new'|'ongoing'|'acknowledged'|'cleared'} state
  * @property {string} text
  * @property {number|null} raised_at

@@ -104,7 +104,7 @@ export class AlertPanel {
   fillPast(element, alert) {
     const part = (/** @type {string} */ name) => /** @type {HTMLElement} */ (element.querySelector(name));
     setText(part('.past-time'), clock(alert.cleared_at ?? alert.updated_at));
-    setText(part('.past-why'), [alert.runway, alert.clear_reason].filter(Boolean).join(' · '));
+    setText(part('.past-why'), [alert.worst_stage === 'alarm' ? 'ALARM' : '', alert.runway, alert.clear_reason].filter(Boolean).join(' · '));
   }
 
   /** @param {number} id */

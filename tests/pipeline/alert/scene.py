@@ -87,6 +87,7 @@ def tracks_at(movers: list[Mover], time: float, noise: np.random.Generator | Non
             "altitude": np.nan,
             "heading": np.nan,
             "hits": 20,
+            "born": 0.0,
             "phase": TrackPhase.CONFIRMED,
             "sources": Source.RADAR,
         }.items()

@@ -67,6 +67,22 @@ def test_one_look_in_three_is_not_enough() -> None:
         assert bench.step() == []
 
 
+def test_settings_with_which_nothing_could_be_raised_are_refused() -> None:
+    with pytest.raises(ValueError, match="at most 16"):
+        LifeSettings(raise_hits=17, raise_looks=20)
+    with pytest.raises(ValueError, match="raise_hits <= raise_looks"):
+        LifeSettings(raise_hits=4)
+    with pytest.raises(ValueError, match="most"):
+        LifeSettings(most=0)
+
+
+def test_the_most_hits_that_may_be_asked_for_raise_an_alert() -> None:
+    bench = Bench(raise_hits=16, raise_looks=16)
+    for _ in range(15):
+        assert bench.step(conflict()) == []
+    assert bench.step(conflict()) == ["raise information"]
+
+
 def test_many_updates_within_one_look_count_once() -> None:
     bench = Bench()
     bench.step()
@@ -97,10 +113,42 @@ def test_lowered_and_cleared_only_after_a_while_and_with_a_reason() -> None:
 def test_a_lost_target_is_no_proof_of_safety() -> None:
     bench = Bench(refresh_s=1e9)
     bench.step(conflict("alarm", certain=True))
-    assert bench.step(seconds=5, tracks=TWO[:1]) == ["update information"]
-    assert bench.step(seconds=3, tracks=TWO[:1]) == ["clear information"]
+    assert bench.step(seconds=7.5, tracks=TWO[:1]) == []
+    assert bench.monitor.alerts[0].stage == "alarm"
+    assert bench.step(seconds=0.5, tracks=TWO[:1]) == ["clear alarm"]
     assert bench.changes[0].alert.clear_reason == "target lost"
     assert len(bench.changes[0].alert.targets) == 2
+
+
+def test_an_alarm_stays_while_its_lost_target_may_still_be_there_though_another_conflict_goes_on() -> None:
+    bench = Bench(refresh_s=1e9)
+    alone = replace(conflict(tracks=(1,)), intruder=1)
+    bench.step(replace(conflict("alarm", certain=True), intruder=1))
+    for _ in range(7):
+        bench.step(alone, tracks=TWO[:1])
+        assert bench.monitor.alerts[0].stage == "alarm"
+    bench.step(alone, tracks=TWO[:1])
+    assert [(one.id, one.stage, one.worst_stage) for one in bench.monitor.alerts] == [(1, "information", "alarm")]
+
+
+def test_a_loss_after_an_alarm_was_lowered_does_not_raise_it_again() -> None:
+    bench = Bench(refresh_s=1e9)
+    bench.step(conflict("alarm", certain=True))
+    bench.step(conflict(), seconds=4)
+    assert bench.step(seconds=1, tracks=TWO[:1]) == []
+    assert bench.monitor.alerts[0].stage == "information"
+
+
+def test_the_worst_stage_stays_recorded() -> None:
+    bench = Bench()
+    bench.step(conflict(certain=True))
+    assert bench.monitor.alerts[0].worst_stage == "information"
+    bench.step(conflict("alarm"))
+    bench.step(conflict(), seconds=4)
+    bench.step(seconds=4)
+    assert [(one.state, one.stage, one.worst_stage) for one in bench.monitor.cleared] == [
+        ("cleared", "information", "alarm")
+    ]
 
 
 def test_degraded_sensors_lower_to_information_but_never_silence() -> None:
@@ -140,8 +188,9 @@ def test_escalation_asks_for_attention_again_but_only_once() -> None:
     bench.monitor.acknowledge(1, "tower", bench.time)
     bench.step(conflict("alarm"))
     alert = bench.monitor.alerts[0]
-    assert (alert.state, alert.acknowledged_by, alert.aural) == ("ongoing", None, True)
-    bench.monitor.acknowledge(1, "tower", bench.time)
+    assert (alert.state, alert.acknowledged_by, alert.aural) == ("ongoing", "tower", True)
+    assert alert.acknowledged_at is not None
+    assert bench.monitor.acknowledge(1, "ground", bench.time).alert.acknowledged_by == "ground"
     bench.step(conflict(), seconds=5)
     bench.step(conflict("alarm"))
     assert bench.monitor.alerts[0].state == "acknowledged"

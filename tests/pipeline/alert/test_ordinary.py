@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from pipeline.alert.monitor import AlertMonitor
@@ -68,6 +70,38 @@ def test_one_landing_aircraft_seen_as_two_tracks(watch: AlertMonitor) -> None:
     twin = arrival(7, 60, address="")
     twin.path = [(t, e - 25, n + 5) for t, e, n in twin.path]
     assert play(watch, [arrival(1, 60), twin], 0, 130).changes == []
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("lag", [0.9, 1.5])
+def test_one_landing_aircraft_with_two_transponders(watch: AlertMonitor, seed: int | None, lag: float) -> None:
+    # the second one lies behind: through final, braking and the turn off, where the two velocities differ
+    twin = arrival(7, 60 + lag, address="39ffff", callsign="")
+    assert play(watch, [arrival(1, 60), twin], 5, 130, noise=seed).changes == []
+
+
+def echo(born: float, speed: float, **extra: Any) -> Mover:
+    """A track that begins 90 m ahead of an arrival which touches down at 60 s."""
+    return Mover(9, [(61, -1270, 5), (71, -1270 + 10 * speed, 5)], TargetClass.UNKNOWN, {"born": born, **extra})
+
+
+@pytest.mark.parametrize(
+    ("other", "silent_until"),
+    [
+        (echo(61.0, 45.0), 63.0),
+        (echo(50.0, 45.0), 60.0),
+        (echo(61.0, 45.0, callsign="AFR9"), 60.0),
+        (echo(61.0, 0.0), 60.0),
+    ],
+    ids=["young", "older", "named", "standing"],
+)
+def test_only_a_young_unnamed_track_that_moves_with_an_aircraft_may_be_its_echo(
+    watch: AlertMonitor, other: Mover, silent_until: float
+) -> None:
+    lands = Mover(1, [(0, -5630, 0), (100, 1370, 0)], extra={"callsign": "AFR1", "address": "390001"})
+    times = [one.time for one in play(watch, [lands, other], 0, 68).changes if one.operation == "raise"]
+    assert times
+    assert silent_until < min(times) <= silent_until + 2
 
 
 def test_a_go_around_high_above_an_occupied_runway(watch: AlertMonitor) -> None:

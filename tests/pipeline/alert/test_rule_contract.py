@@ -69,6 +69,7 @@ class TestRuleContract:
             assert one.text
             assert set(one.tracks) <= present
             assert len(set(one.tracks)) == len(one.tracks) > 0
+            assert one.intruder is None if name == "opposite_direction" else one.intruder in one.tracks
             assert one.cat004_type > 0
             key = (one.runway, frozenset(one.tracks))
             assert key not in keys

@@ -37,6 +37,17 @@ def test_arrival_to_an_occupied_runway_with_noise_either_way(way: int, seed: int
     assert 43 <= first(played, "runway_occupied", "alarm") <= 49
 
 
+@pytest.mark.parametrize("way", [1, -1])
+def test_an_alarm_for_a_departure_ahead_stays_while_the_arrival_gains_on_it(way: int) -> None:
+    # the departure passes lead_speed (41 m/s) at 49 s and is still slower than the arrival at its threshold
+    played = play(monitor(), [arrival(1, 60, way=way), departure(2, 26, way=way)], 0, 59)
+    assert {live[0].stage for time, live in played.live if time >= 46} == {"alarm"}
+
+
+def test_a_departure_that_draws_away_from_a_slow_arrival_is_nothing() -> None:
+    assert play(monitor(), [arrival(1, 60, speed=45.0), departure(2, 19)], 0, 59).changes == []
+
+
 def test_departure_towards_an_occupant_ahead() -> None:
     played = play(monitor(), [departure(2, 100), parked(3, 600, 10)], 0, 140)
     assert played.stages("runway_occupied") >= {"alarm"}
@@ -70,7 +81,7 @@ def test_vehicle_passes_a_holding_position_with_an_arrival_on_final() -> None:
 
 def test_vehicle_passes_a_holding_position_with_a_departure_rolling() -> None:
     van = Mover(3, [(0, 0, -300), (110, 0, -100), (122, 0, -30), (300, 0, -30)], TargetClass.VEHICLE)
-    played = play(monitor(), [departure(2, 100), van], 0, 140)
+    played = play(monitor(rules=RULES[1:2]), [departure(2, 100), van], 0, 140)
     assert first(played, "hold_entry", "alarm") <= 115
 
 
