@@ -303,7 +303,7 @@ def test_a_text_calls_a_target_by_its_number_and_keeps_its_id(number: int, calle
     tracks = tracks_at(movers, 45.0)
     tracks = tracks.replace(id=tracks.id + 70_000, number=np.array([0, number]))
     alert = monitor().update(tracks, 45.0)[0].alert
-    assert f"Vehicle {called} on runway" in alert.text
+    assert f"#{called} on runway" in alert.text
     assert {one.track: one.number for one in alert.targets} == {70_001: None, 70_003: number or None}
 
 
