@@ -69,7 +69,7 @@ class Radar:
         app = create_app(self.service, hub=Hub(self.service, self.service.settings), store=None)
 
         async def ask() -> httpx.Response:
-            async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://here") as client:
+            async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
                 return await client.get(path)
 
         return asyncio.run(ask())

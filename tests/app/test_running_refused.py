@@ -72,7 +72,7 @@ class Running:
         app = create_app(self.service, hub=Hub(self.service, self.service.settings), store=None)
 
         async def ask() -> str:
-            async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://here") as client:
+            async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
                 return (await client.get("/metrics")).text
 
         found = {one.name: one for one in text_string_to_metric_families(asyncio.run(ask()))}
