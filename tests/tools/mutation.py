@@ -56,10 +56,8 @@ def main(words: Sequence[str] | None = None) -> int:
     """Run the command; 0, 1 when fewer were killed than --least wants, 2 when it cannot be done, 130 when stopped."""
     options = _parser().parse_args(words)
     try:
-        whole = all_mutants()
-        every = [one for one in whole if Path(one.path).parts[1] in options.rooms]
-        aside = equivalents(EQUIVALENT)
-        for name in gone(aside, whole):
+        every, aside = all_mutants(options.rooms), equivalents(EQUIVALENT)
+        for name in gone((name for name in aside if Path(name).parts[1] in options.rooms), every):
             print(f"set aside, but not there any more: {name}", file=sys.stderr)
         chosen = sample(every, aside, options.seed, options.sample, options.only)
         if options.list:
@@ -84,9 +82,9 @@ def main(words: Sequence[str] | None = None) -> int:
     return int(found["share"] < options.least)
 
 
-def all_mutants(root: Path = ROOT) -> list[Mutant]:
-    """Every mutation of ROOMS."""
-    files = [path for room in ROOMS for path in sorted((root / "pipeline" / room).rglob("*.py"))]
+def all_mutants(rooms: Iterable[str] = ROOMS, root: Path = ROOT) -> list[Mutant]:
+    """Every mutation of these rooms."""
+    files = [path for room in rooms for path in sorted((root / "pipeline" / room).rglob("*.py"))]
     return [one for path in files for one in _mutants(path.relative_to(root).as_posix(), path.read_bytes())]
 
 

@@ -225,7 +225,7 @@ def test_equivalent_ones_need_a_reason(tmp_path: Path) -> None:
 
 
 def test_names_that_are_gone_are_told(root: Path) -> None:
-    every = mutation.all_mutants(root)
+    every = mutation.all_mutants(root=root)
     there = one_of("pipeline/filter/plain.py", "0", "1").name
     assert there in {one.name for one in every}
     assert mutation.gone([there, "pipeline/filter/plain.py add: 1 -> 2 in `old`"], every) == [
@@ -250,4 +250,4 @@ def test_the_list_of_a_sample_is_printed_without_trying_it(capsys: pytest.Captur
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 4
     assert all(line.startswith("pipeline/lifecycle/") for line in lines)
-    assert mutation.main(["--only", "nothing is called so"]) == 2
+    assert mutation.main(["--rooms", "lifecycle", "--only", "nothing is called so"]) == 2
