@@ -325,7 +325,8 @@ class RadarChain:
         if self._next_row >= 0:
             self._closed_to = max(closed_from, int(self._extracting.closed_row))
         closed = max(closed_from, 0), max(self._closed_to, 0)
-        return SectorPlots(self.index, scan, self.time, *closed, plots, degraded, *marks)
+        mark, time = marks or (np.empty(0, np.int64), np.empty(0))
+        return SectorPlots(self.index, scan, self.time, *closed, plots, degraded, mark, time)
 
     def _timed(self, spent: dict[str, float], stage: str, work: Callable[..., Any], *words: Any) -> Any:
         if self._clock is None:

@@ -16,6 +16,9 @@ MARKS_A_TURN = 16
 a second, on average half of that, little beside the time the extractor needs to complete a plot. Each mark is a
 decision of its own: with 32 of them a turn costs half as much again."""
 
+FORMER_MARKS_A_TURN = 32
+"""Those of sectors that were recorded before they stated how many marks a turn has."""
+
 PLACES, PLACE = 16, 15
 """A mark stands at the last of so many places of its 16th of a turn, counted from 0: just before the end of the block
 where a radar delivers 32 a turn, so that it is decided with that block and not with the next."""
@@ -28,6 +31,16 @@ def mark_row(mark: Numbers, azimuths: int) -> Numbers:
     turn; with few rows several marks stand at the same row.
     """
     return (PLACES * mark + PLACE) * azimuths // (PLACES * MARKS_A_TURN)
+
+
+def present_marks(mark: Array, time: Array, marks_a_turn: int) -> tuple[Array, Array]:
+    """Numbers (k,) and times of those marks, of a turn with `marks_a_turn`, that stand where one of MARKS_A_TURN does.
+
+    None where a turn has no multiple of MARKS_A_TURN.
+    """
+    every, rest = divmod(marks_a_turn, MARKS_A_TURN)
+    kept = (mark + 1) % max(every, 1) == 0 if every > 0 and rest == 0 else np.zeros(len(mark), np.bool_)
+    return (mark[kept] + 1) // max(every, 1) - 1, time[kept]
 
 
 def first_mark(row: int, azimuths: int) -> int:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from pipeline.tables.marks import FORMER_MARKS_A_TURN, MARKS_A_TURN, present_marks
 from pipeline.tables.schema import Array, Table, column
 
 
@@ -45,6 +46,10 @@ class Plots(Table):
     )
 
 
+UNSTATED = 0
+"""The marks a turn of a sector that does not state them."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SectorPlots:
     """What a radar chain hands on after each block: the plots completed since the block before.
@@ -55,7 +60,8 @@ class SectorPlots:
     mark: (k,) int64 absolute numbers, ascending, of the azimuth marks (`pipeline.tables.marks`) that the antenna passed
     with the sweeps of this block. mark_time: (k,) float64 UTC s of the first sweep received at or after each mark.
     Marks follow the sweeps received, so they may be ahead of `closed_to`; together they are the same however the sweeps
-    were cut into blocks. Both are empty when the source of the sectors does not know them.
+    were cut into blocks. Both are empty when the source of the sectors does not know them. marks_a_turn: how many marks
+    their numbers count in a turn; UNSTATED in sectors read from recordings made before it was told, else MARKS_A_TURN.
     """
 
     radar: int
@@ -67,3 +73,15 @@ class SectorPlots:
     degraded: bool = False
     mark: Array = field(default_factory=lambda: np.empty(0, np.int64))
     mark_time: Array = field(default_factory=lambda: np.empty(0, np.float64))
+    marks_a_turn: int = UNSTATED
+
+    def __post_init__(self) -> None:
+        if self.marks_a_turn == UNSTATED:  # made now, and not read from a recording, which makes no call
+            object.__setattr__(self, "marks_a_turn", MARKS_A_TURN)
+
+    def with_present_marks(self) -> SectorPlots:
+        """The same with its marks numbered as now; those that stand nowhere now are left out."""
+        if self.marks_a_turn == MARKS_A_TURN:
+            return self
+        mark, time = present_marks(self.mark, self.mark_time, self.marks_a_turn or FORMER_MARKS_A_TURN)
+        return replace(self, mark=mark, mark_time=time, marks_a_turn=MARKS_A_TURN)

@@ -22,6 +22,7 @@ def take_sector(core: Core, sector: SectorPlots) -> bool:
     """Take the plots of one sector and decide what can be decided. False, counted, when it cannot be taken."""
     if not _acceptable(core, sector):
         return False
+    sector = sector.with_present_marks()
     site, clock = core.radars[sector.radar], core.clocks[sector.radar]
     azimuths = site.video.azimuths
     if core.began == NEVER:

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from pipeline.tables import MARKS_A_TURN, Plots, SectorPlots, first_mark, mark_row, marks_between, passed_marks
 from pipeline.tables.arrays import Array
+from pipeline.tables.marks import present_marks
 from tests.pipeline.track.scene import T0, make_plots, split_scan
 
 AZIMUTHS = st.sampled_from([1, 7, 15, 16, 17, 31, 32, 33, 45, 96, 100, 1000, 4096])
@@ -134,3 +135,25 @@ def test_the_scene_of_the_tracker_tests_gives_the_same_marks_for_any_cut(sectors
     assert octets([(one.mark, one.mark_time) for one in cut]) == octets([(one.mark, one.mark_time) for one in whole])
     assert whole[0].mark.tolist() == list(range(3 * MARKS_A_TURN, 4 * MARKS_A_TURN))
     assert whole[0].mark_time.tolist() == [T0 + 3 + (16 * k + 15) / 256 for k in range(MARKS_A_TURN)]
+
+
+@pytest.mark.parametrize("azimuths", [96, 1000, 4096])
+def test_of_the_former_32_marks_every_second_stands_where_one_does_now(azimuths: int) -> None:
+    former = np.arange(64, 128)
+    rows = (8 * former + 7) * azimuths // 256
+    mark, time = present_marks(former, former.astype(float), 32)
+    assert mark.tolist() == list(range(32, 64))
+    assert [int(row) for row in mark_row(mark, azimuths)] == rows[1::2].tolist()
+    assert time.tolist() == former[1::2].tolist()
+    assert present_marks(mark, time, MARKS_A_TURN)[0].tolist() == mark.tolist()
+    assert len(present_marks(mark, time, 24)[0]) == len(present_marks(mark, time, 8)[0]) == 0
+
+
+def test_sectors_of_older_recordings_have_their_marks_renumbered() -> None:
+    made = SectorPlots(
+        0, 2, T0, 0, 128, make_plots([], np.empty((0, 2)), 2.0), mark=np.array([64, 65]), mark_time=T0 + np.arange(2.0)
+    )
+    assert made.with_present_marks() is made
+    object.__setattr__(made, "marks_a_turn", 0)  # as it is read, without a call of __init__
+    now = made.with_present_marks()
+    assert (now.mark.tolist(), now.mark_time.tolist(), now.marks_a_turn) == ([32], [T0 + 1.0], MARKS_A_TURN)
