@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from pipeline.kernels.compiled import allocating
-from pipeline.tables.arrays import Array, Floats
+from pipeline.tables.arrays import Floats
 
 MARGIN_VARIANCES = 2.0
 """The margin about an extent is the root of so many times the variance in both axes together: 2 standard deviations
@@ -24,38 +24,15 @@ OUTSIDE = 1.0
 
 
 @allocating
-def enclosing_track(
-    tracks: Array, established: Array, track_time: Floats, mean: Floats, covariance: Floats, track_extent: Floats,
-    time: float, position: Floats, noise: Floats, length: float, least: float,
-) -> int:  # fmt: skip
-    """The place in `tracks` of the track within whose extent a plot lies, nearest to its middle, or -1.
-
-    tracks: (k,) rows of what follows. established: (n,) mask of tracks that may have plots. track_time: (n,) UTC s,
-    mean: (n, 4), covariance: (n, 4, 4), track_extent: (n, 3) length m, width m, direction rad; each is moved along its
-    velocity to the time of the plot. time: s. position: (2,) m. noise: (2, 2) m^2. length: m, of the plot. least: m,
-    that the extent is wider by at least; for long targets more where plot and track are less sure.
-    """
-    best, made = OUTSIDE, -1
-    for k in range(len(tracks)):
-        i = tracks[k]
-        if not established[i]:
-            continue
-        ratio = place_within(
-            track_time[i], mean[i], covariance[i], track_extent[i], time, position, noise, length, least
-        )
-        if ratio < best:
-            best, made = ratio, k
-    return made
-
-
-@allocating
 def place_within(
     track_time: float, mean: Floats, covariance: Floats, track_extent: Floats, time: float, position: Floats,
     noise: Floats, length: float, least: float,
 ) -> float:  # fmt: skip
-    """Where in the extent of one track a plot lies: from 0 in the middle to OUTSIDE at the edge and beyond.
+    """Where in the extent of a track a plot lies: from 0 in the middle to OUTSIDE at the edge and beyond.
 
-    See `enclosing_track`.
+    track_time: UTC s, mean: (4,), covariance: (4, 4), track_extent: (3,) length m, width m, direction rad; the track is
+    moved along its velocity to the time of the plot. time: UTC s. position: (2,) m. noise: (2, 2) m^2. length: m, of
+    the plot. least: m, that the extent is wider by at least; for long targets more where plot and track are less sure.
     """
     dt = time - track_time
     e, n = position[0] - mean[0] - dt * mean[2], position[1] - mean[1] - dt * mean[3]
@@ -76,6 +53,6 @@ def place_within(
 
 @allocating
 def farthest_within(track_extent: Floats, least: float) -> float:
-    """m from the middle of a track, beyond which nothing lies within its extent. See `enclosing_track`."""
+    """m from the middle of a track, beyond which nothing lies within its extent. See `place_within`."""
     long = track_extent[0]
     return float(0.5 * max(long, track_extent[1]) + least + MARGIN_EXTENT_SHARE * long)

@@ -23,9 +23,6 @@ ROUNDING_M = 1e-3
 CELL_M = 50.0
 """m, side of the cells in which plots are searched: about the reach of a gate."""
 
-MOST_MARKS = 63
-"""Marks of a group: the decisions of a cluster are bits of one number."""
-
 
 class Clusters(NamedTuple):
     """of_look: (n,) int32 cluster of each look. of_plot: (m,) int32 cluster of each plot, or `alone`.
@@ -58,7 +55,7 @@ def find_clusters(
     associate: AssociatePart, expected: Expected, established: Array, measured: Measured, plot_row: Array,
     due: Array, number: Array, mark_row: Array, margin: float,
 ) -> Clusters:  # fmt: skip
-    """The clusters of n looks and m plots at the marks of a group, k of them, at most MOST_MARKS.
+    """The clusters of n looks and m plots at the marks of a group: k of them, at most 63, which are bits of a number.
 
     established: (n,) mask of looks within whose extent, `margin` m larger, plots may lie. plot_row: (m,) absolute row
     of each plot. due: (n,) number of the mark at which each look is decided. number, mark_row: (k,) of the marks.

@@ -95,15 +95,15 @@ def _learn_false_plots(core: Core, learnt: Floats, radar: Array) -> None:
 def end_tracks(core: Core, rows: Array) -> None:
     """End the tracks `rows`. A number is given back with the last row of its target."""
     store = core.store
-    ended, numbers = np.empty(len(rows), np.int64), np.empty(len(rows), np.uint16)
+    numbers = np.empty(len(rows), np.uint16)
     if not core.associate.branching:
-        many = _end(store.rows, rows, ended, numbers)
+        many = _end(store.rows, rows, numbers)
     else:
         store.phase[rows] = ENDED
         others = core.column("target")[core.alive()]
         last = rows[~np.isin(store.target[rows], others)]
         last = last[np.unique(store.target[last], return_index=True)[1]]
-        many = _end(store.rows, last, ended, numbers)
+        many = _end(store.rows, last, numbers)
     if many:
         core.count("ended", many)
         if core.numbers.last:
@@ -111,14 +111,14 @@ def end_tracks(core: Core, rows: Array) -> None:
 
 
 @allocating
-def _end(tracks: Array, rows: Array, ended: Array, numbers: Array) -> int:
-    """End rows, and write those that bear an id, and their numbers; how many."""
+def _end(tracks: Array, rows: Array, numbers: Array) -> int:
+    """End rows, and write the numbers of those that bear an id; how many."""
     k = 0
     for i in rows:
         one = tracks[i]
         one["phase"] = ENDED
         if one["id"] > 0:
-            ended[k], numbers[k] = i, one["number"]
+            numbers[k] = one["number"]
             k += 1
     return k
 

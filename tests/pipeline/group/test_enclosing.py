@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.group.enclosing import enclosing_track
 from pipeline.tables.arrays import Array, Floats
+from tests.pipeline.group.enclosing_track import enclosing_track
 
 MARGIN = 4.0
 

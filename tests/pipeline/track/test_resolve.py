@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 
 from pipeline.contracts.associate import Association, Expected
 from pipeline.contracts.measured import Hypotheses
-from pipeline.group.enclosing import enclosing_track
 from pipeline.group.split_plots import join_split_plots
 from pipeline.tables.arrays import Array
 from pipeline.track.clusters import Asked, Clusters
 from pipeline.track.plot_pool import POOL, add_centroid_noise
 from pipeline.track.resolve import Decided, resolve, together
+from tests.pipeline.group.enclosing_track import enclosing_track
 
 MARGIN, CENTROID_SD = 4.0, 0.08
 
