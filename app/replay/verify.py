@@ -204,11 +204,12 @@ class ReplayEngine:
         self.counts.sectors += 1
         if self._own:
             return replace(envelope, body=made)
-        if not len(recorded.mark) and CODEC.encode(envelope) != record.data:
+        present = recorded.with_present_marks()
+        if not len(present.mark) and CODEC.encode(envelope) != record.data:
             # written before sectors had azimuth marks: the chain makes them, the record cannot have them
-            made = replace(made, mark=recorded.mark, mark_time=recorded.mark_time)
-        if CODEC.encode(made) != CODEC.encode(recorded):
-            self.detection_difference = f"plots at {utc_text(record.time)}: {first_difference(recorded, made)}"
+            made = replace(made, mark=present.mark, mark_time=present.mark_time)
+        if CODEC.encode(made) != CODEC.encode(present):
+            self.detection_difference = f"plots at {utc_text(record.time)}: {first_difference(present, made)}"
         return envelope
 
     def _lose(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,18 @@ _SectorPlots.__qualname__ = "SectorPlots"
 _CODEC = ValueCodec((Envelope, _SectorPlots))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _SectorPlotsOf32Marks(_SectorPlots):
+    """The fields of SectorPlots while a turn had 32 azimuth marks, which nothing stated."""
+
+    mark: np.ndarray[Any, np.dtype[np.int64]] = field(default_factory=lambda: np.empty(0, np.int64))
+    mark_time: np.ndarray[Any, np.dtype[np.float64]] = field(default_factory=lambda: np.empty(0, np.float64))
+
+
+_SectorPlotsOf32Marks.__qualname__ = "SectorPlots"
+_CODEC_OF_32_MARKS = ValueCodec((Envelope, _SectorPlotsOf32Marks))
+
+
 @dataclass(slots=True, eq=False)
 class _RadarClock:
     """A radar's clock with fields that it does not have any more."""
@@ -52,6 +64,18 @@ def without_marks(envelope: Envelope) -> bytes:
     assert isinstance(s, SectorPlots)
     body: Any = _SectorPlots(s.radar, s.scan, s.time, s.closed_from, s.closed_to, s.plots, s.degraded)
     return _CODEC.encode(replace(envelope, body=body))
+
+
+def with_32_marks(envelope: Envelope) -> bytes:
+    """The octets of an envelope with a sector while a turn had 32 azimuth marks, every second of them one of today."""
+    s = envelope.body
+    assert isinstance(s, SectorPlots)
+    mark, time = np.repeat(2 * s.mark, 2), np.repeat(s.mark_time, 2)
+    mark[1::2] += 1
+    body: Any = _SectorPlotsOf32Marks(
+        s.radar, s.scan, s.time, s.closed_from, s.closed_to, s.plots, s.degraded, mark, time
+    )
+    return _CODEC_OF_32_MARKS.encode(replace(envelope, body=body))
 
 
 def older_table(table: Table, without: Collection[str] = (), dtypes: Mapping[str, str] | None = None) -> bytes:

@@ -6,7 +6,7 @@ import errno
 import json
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,7 @@ from pipeline.picture import Picture, SensorState
 from pipeline.tables import Plots, SectorPlots, Sweeps
 from tests.app.replay.recording import airport, decoded, document, records, rewritten, settings
 from tests.app.runtime.small_radar import AZIMUTHS, RANGES, T0, VIDEO, small_chain, small_site, turn
-from tests.support.older_forms import without_marks
+from tests.support.older_forms import with_32_marks, without_marks
 from tests.support.running import until
 
 SMALL = RadarSettings(
@@ -126,12 +126,15 @@ def test_a_part_of_it_is_identical_too(day: Path) -> None:
     assert found.sectors > 15
 
 
-def test_a_journal_from_before_sectors_had_marks_is_compared_without_them(day: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("older_form", [without_marks, with_32_marks])
+def test_a_journal_with_no_marks_or_32_a_turn_is_compared(
+    day: Path, tmp_path: Path, older_form: Callable[[Envelope], bytes]
+) -> None:
     (file,) = day.glob("*.mcap")
 
     def older(one: Any) -> bytes:
         made = decoded(one) if one.topic == INPUT else None
-        return without_marks(made) if made is not None and isinstance(made.body, SectorPlots) else one.data
+        return older_form(made) if made is not None and isinstance(made.body, SectorPlots) else one.data
 
     assert any(len(made.body.mark) for one in records(day) if isinstance((made := decoded(one)), Envelope)
                and isinstance(made.body, SectorPlots))  # fmt: skip
