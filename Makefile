@@ -4,6 +4,7 @@
 PYTHON ?= python3
 MODE ?= demo
 TESTS ?=
+JOBS ?= auto
 VENV := .venv
 BIN := $(VENV)/bin
 UV_VERSION := 0.13.9
@@ -32,8 +33,8 @@ help: ## say what there is
 run: install ## run the demonstration at http://127.0.0.1:8000 (another port: AIRSIDE_PORT=8080 make run)
 	@exec $(BIN)/airside $(MODE)
 
-test: install-dev ## run all tests (some of them: TESTS=tests/pipeline/alert make test)
-	$(BIN)/python -m pytest $(TESTS)
+test: install-dev ## run all tests, a process a processor (some: TESTS=tests/pipeline/alert make test; fewer: JOBS=1)
+	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile -rs $(TESTS)
 
 install: $(VENV)/.installed ## make .venv with what running needs, from requirements.lock
 
