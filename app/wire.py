@@ -47,11 +47,17 @@ def plain(value: Any) -> Any:
     return msgspec.json.decode(encode(value))
 
 
-def accuracy_95(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Semi-major axis (m) of the 95 % ellipse of each position. covariance: (n, >=2, >=2)."""
+def ellipse_95(covariance: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Semi-major and semi-minor axis (m) of the 95 % ellipse of each position, and the bearing of the longer (rad).
+
+    covariance: (n, >=2, >=2) of east and north, m^2. The bearing is from true north, in [-pi/2, pi/2].
+    """
     a, b, c = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
-    larger = 0.5 * (a + c) + np.sqrt(0.25 * (a - c) ** 2 + b**2)
-    return np.asarray(RADIUS_95 * np.sqrt(np.maximum(larger, 0.0)))
+    half_sum, half_difference = 0.5 * (a + c), np.hypot(0.5 * (a - c), b)
+    major, minor = (
+        RADIUS_95 * np.sqrt(np.maximum(one, 0.0)) for one in (half_sum + half_difference, half_sum - half_difference)
+    )
+    return major, minor, 0.5 * np.arctan2(2.0 * b, c - a)
 
 
 def nullable(values: NDArray[Any], decimals: int) -> list[float | None]:
@@ -69,6 +75,12 @@ def degrees(values: NDArray[Any]) -> NDArray[np.float64]:
     """Radians as degrees in [0, 360), rounded to a tenth first so that 360.0 does not appear."""
     with np.errstate(invalid="ignore"):
         return np.mod(np.round(np.rad2deg(values.astype(np.float64)), 1), 360.0)
+
+
+def half_degrees(values: NDArray[Any]) -> NDArray[np.float64]:
+    """Radians of an axis, which has no sense, as degrees in [0, 180), rounded to a tenth first."""
+    with np.errstate(invalid="ignore"):
+        return np.mod(np.round(np.rad2deg(values.astype(np.float64)), 1), 180.0)
 
 
 class Wire:
@@ -96,6 +108,7 @@ class Wire:
         speed = np.hypot(tracks.state[:, 2], tracks.state[:, 3])
         course = degrees(np.arctan2(tracks.state[:, 2], tracks.state[:, 3]))
         course[~(speed >= MOVING_MPS)] = np.nan
+        major, minor, bearing = ellipse_95(tracks.covariance)
         return {
             "id": tracks.id.tolist(),
             "number": [one or None for one in tracks.number.tolist()],
@@ -109,6 +122,7 @@ class Wire:
             "speed_mps": nullable(speed, 2),
             "course_deg": nullable(course, 1),
             "heading_deg": nullable(degrees(tracks.heading), 1),
+            "axis_deg": nullable(half_degrees(tracks.axis), 1),
             "length_m": nullable(tracks.length, 1),
             "width_m": nullable(tracks.width, 1),
             "class": [CLASSES[min(one, 2)] for one in tracks.category.tolist()],
@@ -118,7 +132,9 @@ class Wire:
             "zone": self.zone_names(tracks.zone).tolist(),
             "runway": self.runway_names(tracks.runway).tolist(),
             "sources": [SOURCES[one & 7] for one in tracks.sources.tolist()],
-            "accuracy_m": nullable(accuracy_95(tracks.covariance), 1),
+            "accuracy_m": nullable(major, 1),
+            "accuracy_minor_m": nullable(minor, 1),
+            "accuracy_bearing_deg": nullable(half_degrees(bearing), 1),
             "simulated": tracks.simulated.tolist(),
         }
 

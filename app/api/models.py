@@ -85,6 +85,9 @@ class Track(Model):
     speed_mps: float | None
     course_deg: float | None = Field(description="direction of movement; null below 0.5 m/s")
     heading_deg: float | None = Field(description="where the nose points")
+    axis_deg: float | None = Field(
+        description="bearing of the long axis as radars see it, 0 to 180; known of targets that never moved as well"
+    )
     length_m: float | None
     width_m: float | None
     class_: ClassName = Field(alias="class")
@@ -95,6 +98,8 @@ class Track(Model):
     runway: str | None = Field(description="runway whose strip it is in")
     sources: list[SourceName]
     accuracy_m: float | None = Field(description="semi-major axis of the 95 % ellipse of the position")
+    accuracy_minor_m: float | None = Field(description="semi-minor axis of that ellipse")
+    accuracy_bearing_deg: float | None = Field(description="bearing of its longer axis, 0 to 180")
     simulated: bool = Field(description="rests on simulated input")
 
 

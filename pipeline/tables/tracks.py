@@ -51,6 +51,9 @@ class Tracks(Table):
     length: Array = column("f4", "m", "smoothed extent along the heading; nan when unknown", default=float("nan"))
     width: Array = column("f4", "m", "smoothed extent across the heading; nan when unknown", default=float("nan"))
     heading: Array = column("f4", "rad", "where the nose points; nan when unknown", default=float("nan"))
+    axis: Array = column(
+        "f4", "rad", "direction of the long axis as radars see it, in [0, pi); nan when unknown", default=float("nan")
+    )
     altitude: Array = column("f4", "m", "height above the airport; nan when unknown", default=float("nan"))
     on_ground: Array = column("?", "", "held to be on the ground", default=True)
     category: Array = column("u1", "", "TargetClass", default=0)

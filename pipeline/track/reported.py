@@ -20,7 +20,7 @@ _SAME = {
 }  # fmt: skip
 """Columns that the table has as they are in the store, besides those of text, in the order of `_describe`."""
 
-_FACTS = {"misses": "i4", "length": "f4", "width": "f4", "heading": "f4", "sources": "u1"}
+_FACTS = {"misses": "i4", "length": "f4", "width": "f4", "heading": "f4", "axis": "f4", "sources": "u1"}
 """Columns that are made for it, in that order too."""
 
 COURSE_SPEED = 2.0
@@ -137,7 +137,8 @@ COASTING, BUILDING = int(TrackPhase.COASTING), int(SurfaceKind.BUILDING)
 def _describe(
     tracks: Array, evidence: Array, rows: Array, state: Floats, radars: int, remembered: float, identity: Array,
     number: Array, phase: Array, updated: Floats, born: Floats, hits: Array, altitude: Array, on_ground: Array,
-    category: Array, simulated: Array, misses: Array, length: Array, width: Array, heading: Array, sources: Array,
+    category: Array, simulated: Array, misses: Array, length: Array, width: Array, heading: Array, axis: Array,
+    sources: Array,
 ) -> None:  # fmt: skip
     for k in range(len(rows)):
         one = tracks[rows[k]]
@@ -152,9 +153,9 @@ def _describe(
         misses[k] = max(fewest, 0)
         v_east, v_north = state[k, 2], state[k, 3]
         if one["extent_count"] > 0:
-            length[k], width[k], heading[k] = one["length"], one["width"], one["heading"]
+            length[k], width[k], heading[k], axis[k] = one["length"], one["width"], one["heading"], one["axis_bearing"]
         else:
-            length[k] = width[k] = heading[k] = np.nan
+            length[k] = width[k] = heading[k] = axis[k] = np.nan
             if v_east * v_east + v_north * v_north > COURSE_SPEED * COURSE_SPEED:
                 heading[k] = np.arctan2(v_east, v_north) % (2.0 * np.pi)
         sources[k] = (

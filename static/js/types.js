@@ -13,6 +13,7 @@
  * @property {number|null} speed_mps
  * @property {number|null} course_deg
  * @property {number|null} heading_deg
+ * @property {number|null} [axis_deg]  bearing of the long axis as radars see it, 0 to 180
  * @property {number|null} length_m
  * @property {number|null} width_m
  * @property {string|null} class  aircraft, vehicle, unknown
@@ -22,7 +23,9 @@
  * @property {string|null} zone
  * @property {string|null} runway
  * @property {string[]|null} sources
- * @property {number|null} accuracy_m
+ * @property {number|null} accuracy_m  longer half axis of the ellipse that holds the position with 95 %
+ * @property {number|null} [accuracy_minor_m]
+ * @property {number|null} [accuracy_bearing_deg]  of the longer axis, 0 to 180
  * @property {boolean|null} simulated
  * @property {number|null} [altitude_m]
  * @property {boolean|null} [on_ground]

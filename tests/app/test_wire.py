@@ -4,11 +4,12 @@ import json
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from app.api import models
-from app.wire import RADIUS_95, Wire, accuracy_95, encode
+from app.wire import RADIUS_95, Wire, ellipse_95, encode
 from pipeline.tables import Tracks
 from tests.support.fake_service import FakeService
 from tests.support.small_airport import small_airport
@@ -72,16 +73,28 @@ def test_nothing_in_a_table_can_put_nan_on_the_wire(values: list[float], index: 
 def test_the_accuracy_holds_95_percent_of_a_round_gaussian() -> None:
     rng = np.random.default_rng(3)
     points = rng.normal(0, 4.0, (200_000, 2))
-    radius = float(accuracy_95(np.eye(2)[None] * 16.0)[0])
+    radius, minor = (float(one[0]) for one in ellipse_95(np.eye(2)[None] * 16.0)[:2])
+    assert minor == radius
     assert radius == RADIUS_95 * 4.0
     share = float(np.mean(np.hypot(*points.T) <= radius))
     assert abs(share - 0.95) < 5 * math.sqrt(0.95 * 0.05 / len(points))
 
 
-def test_the_accuracy_is_the_long_axis_of_a_tilted_ellipse() -> None:
-    turn = np.array([[np.cos(0.6), -np.sin(0.6)], [np.sin(0.6), np.cos(0.6)]])
-    covariance = turn @ np.diag([25.0, 4.0]) @ turn.T
-    assert np.isclose(accuracy_95(covariance[None])[0], RADIUS_95 * 5.0)
+@pytest.mark.parametrize("bearing", [0.0, 0.6, 1.5, 2.2, 3.1])
+def test_the_accuracy_is_a_tilted_ellipse(bearing: float) -> None:
+    along = np.array([np.sin(bearing), np.cos(bearing)])
+    across = np.array([np.cos(bearing), -np.sin(bearing)])
+    covariance = np.zeros((1, 4, 4))
+    covariance[0, :2, :2] = 25.0 * np.outer(along, along) + 4.0 * np.outer(across, across)
+    (row,) = WIRE.tracks(one_track(covariance=covariance))
+    assert row["accuracy_m"] == pytest.approx(RADIUS_95 * 5.0, abs=0.05)
+    assert row["accuracy_minor_m"] == pytest.approx(RADIUS_95 * 2.0, abs=0.05)
+    assert row["accuracy_bearing_deg"] == pytest.approx(math.degrees(bearing), abs=0.06)
+
+
+def test_an_axis_has_no_sense_and_is_null_where_unknown() -> None:
+    axes = [WIRE.tracks(one_track(axis=axis))[0]["axis_deg"] for axis in (0.0, 1.0, np.pi, np.nan)]
+    assert axes == [0.0, 57.3, 0.0, None]
 
 
 def test_an_alert_has_exactly_the_fields_of_the_model() -> None:

@@ -16,10 +16,19 @@ const DISC = shape(Array.from({ length: 20 }, (_, i) => [
   0.5 * Math.cos((i * Math.PI) / 10), 0.5 * Math.sin((i * Math.PI) / 10),
 ]), false);
 
+/** Long, and the same at both ends: the axis is known, the nose is not. */
+const CAPSULE = [1, -1].flatMap((end) => Array.from({ length: 13 }, (_, i) => {
+  const angle = (i * Math.PI) / 12;
+  return [end * 0.5 * Math.cos(angle), end * (0.3 + 0.2 * Math.sin(angle))];
+}));
+
 /** @param {number[][]} points @param {boolean} mirror @returns {number[][]} */
 function shape(points, mirror) {
   return mirror ? [...points, ...[...points].reverse().map(([x, y]) => [-x, y])] : points;
 }
+
+/** Width of a small capsule over its length. */
+const CAPSULE_WIDTH = 0.5;
 
 const MIN_AIRCRAFT = 15;
 const MIN_VEHICLE = 8;
@@ -31,6 +40,7 @@ const TRUE_FROM = 24;
  * @typedef {object} SymbolLook
  * @property {'aircraft'|'vehicle'|'unknown'} kind
  * @property {number|null} heading  rad from true north
+ * @property {number|null} axis  rad from true north, the long axis where it is known; looked at without a heading
  * @property {number} length  m
  * @property {number} width  m
  * @property {boolean} hollow
@@ -57,19 +67,20 @@ export function symbolRadius(kind, length, scale) {
  */
 export function drawSymbol(context, x, y, scale, rotation, look) {
   const { kind, heading } = look;
+  const along = heading ?? look.axis;
   let points = DISC;
   let [w, h] = [11, 11];
   // what has no nose to show is an outline at true scale, so that the video below it stays visible
   const outline = look.length * scale >= TRUE_FROM && (kind === 'unknown' || (kind === 'aircraft' && heading === null));
   if (kind === 'vehicle') {
     h = Math.max(MIN_VEHICLE, look.length * scale);
-    w = Math.max(MIN_VEHICLE * (heading === null ? 1 : 0.75), look.width * scale);
+    w = Math.max(MIN_VEHICLE * (along === null ? 1 : 0.75), look.width * scale);
     points = BOX;
   } else if (outline) {
-    // along the heading the extent is length by width; without one it is somewhere in the circle
+    // along its axis the extent is length by width; without one it is somewhere in the circle
     h = look.length * scale;
-    w = heading === null ? h : look.width * scale;
-    points = heading === null ? DISC : BOX;
+    w = along === null ? h : look.width * scale;
+    points = along === null ? DISC : kind === 'unknown' ? BOX : CAPSULE;
   } else if (kind === 'unknown') {
     h = w = Math.max(MIN_UNKNOWN, Math.min(24, Math.max(look.length, look.width) * scale * 0.7));
     points = DIAMOND;
@@ -77,8 +88,12 @@ export function drawSymbol(context, x, y, scale, rotation, look) {
     h = Math.max(MIN_AIRCRAFT, look.length * scale);
     w = look.length * scale >= MIN_AIRCRAFT ? look.width * scale : h * 0.95;
     points = h > 30 ? AIRCRAFT : AIRCRAFT_SMALL;
+  } else if (along !== null) {
+    h = Math.max(MIN_AIRCRAFT, look.length * scale);
+    w = h * CAPSULE_WIDTH;
+    points = CAPSULE;
   }
-  const turn = heading === null || (kind === 'unknown' && !outline) ? 0 : heading - rotation;
+  const turn = along === null || (kind === 'unknown' && !outline) ? 0 : along - rotation;
   trace(context, points, x, y, Math.cos(turn), Math.sin(turn), w, h);
   if (outline) {
     context.strokeStyle = look.ink;

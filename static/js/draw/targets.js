@@ -1,7 +1,7 @@
 // Symbols, vectors, history and alert rings of every target.
 
 import { classOf, isCoasting, isStanding } from '../model/label_text.js';
-import { coastedS, headingAt, positionAt } from '../model/motion.js';
+import { axisOf, coastedS, headingAt, positionAt } from '../model/motion.js';
 import { FAREWELL_MS } from '../feed/picture.js';
 import { drawSymbol, extentOf, symbolRadius } from './symbols.js';
 
@@ -24,8 +24,9 @@ import { drawSymbol, extentOf, symbolRadius } from './symbols.js';
  * @property {Set<number>} occupants  of any runway's protection area
  */
 
-/** A circle of accuracy smaller than this lies within every symbol and is not drawn, px. */
+/** An ellipse of accuracy smaller than this lies within every symbol and is not drawn, px. */
 const ACCURACY_FROM = 4;
+const RAD = Math.PI / 180;
 
 /** Bring every target to where it is now. @param {Scene} scene @param {number} nowMs */
 export function advance(scene, nowMs) {
@@ -83,7 +84,8 @@ function drawOne(context, scene, target, nowMs) {
   const hollow = isCoasting(track, coastedS(target, scene.picture.time)) || track.phase === 'tentative';
   const ink = inkOf(scene, target);
   if (hollow) context.globalAlpha *= 0.85;
-  drawSymbol(context, target.x, target.y, view.scale, view.rotation, { kind, heading, length, width, hollow, ink, halo: theme.ink.halo });
+  const axis = axisOf(track);
+  drawSymbol(context, target.x, target.y, view.scale, view.rotation, { kind, heading, axis, length, width, hollow, ink, halo: theme.ink.halo });
   if (hollow) context.globalAlpha = 1;
   const stage = scene.alerted.get(track.id);
   const radius = symbolRadius(kind, length, view.scale) + 6;
@@ -120,16 +122,19 @@ function drawRing(context, scene, target, radius, stage) {
 }
 
 /**
- * The circle that holds the position with 95 %. The feed tells the longer axis of the ellipse alone.
+ * The ellipse that holds the position with 95 %.
  * @param {CanvasRenderingContext2D} context @param {Scene} scene @param {Target} target
  */
 function drawAccuracy(context, scene, target) {
-  const radius = (target.track.accuracy_m ?? 0) * scene.view.scale;
+  const { accuracy_m: major, accuracy_minor_m: minor, accuracy_bearing_deg: bearing } = target.track;
+  const radius = (major ?? 0) * scene.view.scale;
   if (radius < ACCURACY_FROM) return;
+  // the canvas counts angles clockwise from its right
+  const turn = ((bearing ?? 0) - 90) * RAD - scene.view.rotation;
   context.lineWidth = 1;
   context.setLineDash([2, 3]);
   context.beginPath();
-  context.arc(target.x, target.y, radius, 0, 2 * Math.PI);
+  context.ellipse(target.x, target.y, radius, (minor ?? major ?? 0) * scene.view.scale, turn, 0, 2 * Math.PI);
   context.stroke();
   context.setLineDash([]);
 }

@@ -111,7 +111,7 @@ def test_misses_are_those_of_the_radar_that_has_seen_it_and_missed_it_least() ->
 
 
 def test_extent_and_heading_are_those_of_the_track_and_without_an_extent_the_course_of_what_moves() -> None:
-    known = {"length": 30.0, "width": 9.0, "heading": 1.5}
+    known = {"length": 30.0, "width": 9.0, "heading": 1.5, "axis_bearing": 0.25}
     core = core_of({**known, "extent_count": 1}, known, known, known)
     for row, velocity in ((2, (-1.1, 1.7)), (3, (-1.1, 1.6))):
         core.store.rows["state"][row, 2:] = velocity
@@ -119,6 +119,8 @@ def test_extent_and_heading_are_those_of_the_track_and_without_an_extent_the_cou
     assert tracks.length[0] == 30.0
     assert tracks.width[0] == 9.0
     assert tracks.heading[0] == 1.5
+    assert tracks.axis[0] == 0.25
+    assert np.isnan(tracks.axis[1:]).all()
     assert np.isnan(tracks.length[1:]).all()
     assert np.isnan(tracks.width[1:]).all()
     assert tracks.heading[1] == pytest.approx(math.atan2(3, -4))
