@@ -7,14 +7,29 @@ and are kept on disk (`app.kernel_cache` says where).
 
 from __future__ import annotations
 
+import uuid
 from collections.abc import Callable
 from functools import partial
 from typing import Any, ParamSpec, Protocol, TypeVar
 
 from numba import njit
+from numba.core.caching import IndexDataCacheFile
 
 Given = ParamSpec("Given")
 Result = TypeVar("Result")
+
+
+def own_file_name(cache: Any, number: int) -> str:
+    """The name of the file for one more compiled kernel of a cache on disk: no other file is ever called so.
+
+    numba numbers them from the index that it read before it compiled. Two processes that compile the same kernel for
+    different arguments at once then give both the same number, and the index may tell either that the file is its own:
+    code for arrays without gaps would work on arrays with gaps, and read what does not belong to them.
+    """
+    return str(cache._data_name_pattern.format(number=number)).replace(f".{number}.", f".{uuid.uuid4().hex}.")
+
+
+IndexDataCacheFile._data_name = own_file_name  # type: ignore[method-assign]
 
 
 class Decorator(Protocol):
