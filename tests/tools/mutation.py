@@ -1,9 +1,9 @@
-"""Mutation testing of the tracker: do its tests notice when one thing in it is changed?
+"""Mutation testing: do the tests of a part of the program notice when one thing in it is changed?
 
-    python -m tests.tools.mutation --sample 60 --seed 1 --jobs 2 --json mutants.json
+    python -m tests.tools.mutation tracker --sample 60 --seed 1 --jobs 2 --json mutants.json
 
-takes a seeded sample of single mutations of pipeline/track, filter, associate, lifecycle and group, tries each in a
-copy of the project, and says which were killed and which survived. A survivor is a hole in the tests, or does the same
+takes a seeded sample of single mutations of the folders of a suite (SUITES: tracker, service), tries each in a copy of
+the project, and says which were killed and which survived. A survivor is a hole in the tests, or does the same
 as the original: those are set aside by name, with the reason, in tests/tools/equivalent_mutants.toml.
 
 To compile the kernels anew for each mutant would take most of the time, so it is tried in two rounds. Before them, the
@@ -30,6 +30,7 @@ import tomllib
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -40,11 +41,31 @@ from tests.tools.mutation_trees import RAN_AWAY, SURVIVED, Outcome, Tree, TreeEr
 
 ROOT = Path(__file__).resolve().parents[2]
 
-ROOMS = ("track", "filter", "associate", "lifecycle", "group")
-"""Folders of pipeline/ that are mutated."""
 
-TESTS = (*(f"tests/pipeline/{room}" for room in ROOMS), "tests/pipeline/test_engine.py", "tests/proof")
-"""Folders and files of the tests that a mutation is held against, those that take longest at the end."""
+@dataclass(frozen=True)
+class Suite:
+    """rooms: folders that are mutated. more_tests: what a mutation is held against beside the tests of these folders,
+    those that take longest at the end."""
+
+    rooms: tuple[str, ...]
+    more_tests: tuple[str, ...]
+
+    @property
+    def tests(self) -> tuple[str, ...]:
+        """Folders and files of tests."""
+        return (*(there for room in self.rooms if (ROOT / (there := f"tests/{room}")).exists()), *self.more_tests)
+
+
+SUITES = {
+    "tracker": Suite(
+        tuple(f"pipeline/{room}" for room in ("track", "filter", "associate", "lifecycle", "group")),
+        ("tests/pipeline/test_engine.py", "tests/proof"),
+    ),
+    "service": Suite(
+        ("pipeline/alert", "pipeline/situation", "app/live", "app/api", "app/ingest"),
+        ("tests/app/test_wire.py", "tests/app/test_service_contract.py"),
+    ),
+}
 
 EQUIVALENT = Path(__file__).with_name("equivalent_mutants.toml")
 
@@ -56,8 +77,12 @@ def main(words: Sequence[str] | None = None) -> int:
     """Run the command; 0, 1 when fewer were killed than --least wants, 2 when it cannot be done, 130 when stopped."""
     options = _parser().parse_args(words)
     try:
-        every, aside = all_mutants(options.rooms), equivalents(EQUIVALENT)
-        for name in gone((name for name in aside if Path(name).parts[1] in options.rooms), every):
+        suite = SUITES[options.suite]
+        if unknown := set(options.rooms or ()) - set(suite.rooms):
+            raise ValueError(f"{', '.join(sorted(unknown))}: not a folder of this suite ({', '.join(suite.rooms)})")
+        rooms = tuple(options.rooms or suite.rooms)
+        every, aside = all_mutants(rooms), equivalents(EQUIVALENT)
+        for name in gone((name for name in aside if name.startswith(tuple(f"{room}/" for room in rooms))), every):
             print(f"set aside, but not there any more: {name}", file=sys.stderr)
         chosen = sample(every, aside, options.seed, options.sample, options.only)
         if options.list:
@@ -68,7 +93,7 @@ def main(words: Sequence[str] | None = None) -> int:
         print(f"{len(chosen)} of {len(every):,} mutations, seed {options.seed}", flush=True)
         if options.json is not None:
             check_writable(options.json)
-        outcomes = try_all(chosen, options.jobs, options.deselect)
+        outcomes = try_all(chosen, suite, options.jobs, options.deselect)
     except (TreeError, ValueError, OSError) as error:
         print(f"mutation: {error}", file=sys.stderr)
         return 2
@@ -82,9 +107,9 @@ def main(words: Sequence[str] | None = None) -> int:
     return int(found["share"] < options.least)
 
 
-def all_mutants(rooms: Iterable[str] = ROOMS, root: Path = ROOT) -> list[Mutant]:
-    """Every mutation of these rooms."""
-    files = [path for room in rooms for path in sorted((root / "pipeline" / room).rglob("*.py"))]
+def all_mutants(rooms: Iterable[str], root: Path = ROOT) -> list[Mutant]:
+    """Every mutation of these folders."""
+    files = [path for room in rooms for path in sorted((root / room).rglob("*.py"))]
     return [one for path in files for one in _mutants(path.relative_to(root).as_posix(), path.read_bytes())]
 
 
@@ -118,9 +143,9 @@ def sample(
     return fit[:size]
 
 
-def files_of_tests(root: Path = ROOT) -> list[str]:
-    """All files of TESTS that are there."""
-    found = [path for one in TESTS for path in ([root / one] if one.endswith(".py") else _tests_in(root / one))]
+def files_of_tests(suite: Suite, root: Path = ROOT) -> list[str]:
+    """All files of a suite's tests that are there."""
+    found = [path for one in suite.tests for path in ([root / one] if one.endswith(".py") else _tests_in(root / one))]
     return [path.relative_to(root).as_posix() for path in found if path.is_file()]
 
 
@@ -141,13 +166,13 @@ def _tests_in(folder: Path) -> list[Path]:
     return sorted(folder.rglob("test_*.py"))
 
 
-def try_all(chosen: Sequence[Mutant], jobs: int, deselected: Sequence[str] = ()) -> list[Outcome]:
+def try_all(chosen: Sequence[Mutant], suite: Suite, jobs: int, deselected: Sequence[str] = ()) -> list[Outcome]:
     """Try each in one of `jobs` copies of the project and print what became of it; in the order given.
 
     deselected: tests that are left out, as they fail without a mutation.
     """
     with tempfile.TemporaryDirectory(prefix="airside-mutation-") as folder, ThreadPoolExecutor(jobs) as pool:
-        files = files_of_tests()
+        files = files_of_tests(suite)
         trees = [Tree(ROOT, Path(folder).resolve() / str(k), deselected) for k in range(jobs)]
         unchanged = _prove(trees, files, pool)
         free = queue.SimpleQueue[Tree]()
@@ -237,10 +262,11 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         "python -m tests.tools.mutation", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
+    parser.add_argument("suite", choices=sorted(SUITES), help="what is mutated")
     parser.add_argument("--sample", type=_positive, default=60, help="mutations to try (60)")
     parser.add_argument("--seed", type=int, default=1, help="of the sample; the same seed takes the same (1)")
     parser.add_argument("--jobs", type=_positive, default=1, help="copies of the project that work side by side (1)")
-    parser.add_argument("--rooms", nargs="+", choices=ROOMS, default=ROOMS, help="folders of pipeline/ (all five)")
+    parser.add_argument("--rooms", nargs="+", metavar="FOLDER", help="folders of the suite, as app/live (all)")
     parser.add_argument("--only", metavar="TEXT", help="only mutations whose name holds this text")
     parser.add_argument(
         "--deselect", action="append", default=[], metavar="TEST", help="leave out a test, as pytest does; repeatable"

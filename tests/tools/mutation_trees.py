@@ -23,7 +23,7 @@ from app import kernel_cache
 from tests.tools.mutants import Mutant
 from tests.tools.mutation_watch import FAILED, PASSED, TIMED_OUT
 
-COPIED = ("app", "pipeline", "tests", "pyproject.toml")
+COPIED = ("app", "pipeline", "static", "migrations", "tests", "pyproject.toml", "README.md")
 
 MOST_MEMORY = 8 * 2**30
 """Octets of address space for the tests of a mutant; a loop that allocates must not take the machine with it."""

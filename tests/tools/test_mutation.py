@@ -43,6 +43,7 @@ PLAIN = "tests/pipeline/filter/test_plain.py"
 OUTER = "tests/pipeline/track/test_outer.py"
 ENDLESS = "tests/pipeline/filter/test_endless.py"
 TESTS = [PLAIN, OUTER, ENDLESS]
+TRACKER = mutation.SUITES["tracker"]
 LIMIT = 240.0
 
 
@@ -189,9 +190,11 @@ def test_of_the_others_the_shortest_come_first() -> None:
 
 
 def test_all_tests_named_are_there(root: Path) -> None:
-    assert all((ROOT / one).exists() for one in mutation.TESTS)
-    assert "tests/pipeline/track/test_store.py" in mutation.files_of_tests()
-    assert mutation.files_of_tests(root) == [OUTER, ENDLESS, PLAIN]
+    for suite in mutation.SUITES.values():
+        assert all((ROOT / one).exists() for one in (*suite.rooms, *suite.tests))
+    assert "tests/pipeline/track/test_store.py" in mutation.files_of_tests(TRACKER)
+    assert "tests/app/live/test_live.py" in mutation.files_of_tests(mutation.SUITES["service"])
+    assert mutation.files_of_tests(TRACKER, root) == [OUTER, ENDLESS, PLAIN]
 
 
 def test_a_deselected_test_is_not_run(root: Path, tmp_path: Path) -> None:
@@ -225,7 +228,7 @@ def test_equivalent_ones_need_a_reason(tmp_path: Path) -> None:
 
 
 def test_names_that_are_gone_are_told(root: Path) -> None:
-    every = mutation.all_mutants(root=root)
+    every = mutation.all_mutants(TRACKER.rooms, root)
     there = one_of("pipeline/filter/plain.py", "0", "1").name
     assert there in {one.name for one in every}
     assert mutation.gone([there, "pipeline/filter/plain.py add: 1 -> 2 in `old`"], every) == [
@@ -246,8 +249,10 @@ def test_the_document_says_what_was_killed_where_and_by_what() -> None:
 
 
 def test_the_list_of_a_sample_is_printed_without_trying_it(capsys: pytest.CaptureFixture[str]) -> None:
-    assert mutation.main(["--list", "--sample", "4", "--rooms", "lifecycle"]) == 0
+    assert mutation.main(["tracker", "--list", "--sample", "4", "--rooms", "pipeline/lifecycle"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 4
     assert all(line.startswith("pipeline/lifecycle/") for line in lines)
-    assert mutation.main(["--rooms", "lifecycle", "--only", "nothing is called so"]) == 2
+    assert mutation.main(["tracker", "--rooms", "pipeline/lifecycle", "--only", "nothing is called so"]) == 2
+    assert mutation.main(["tracker", "--rooms", "app/live"]) == 2
+    assert "app/live: not a folder of this suite (pipeline/track, " in capsys.readouterr().err
