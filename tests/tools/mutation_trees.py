@@ -120,6 +120,8 @@ class Tree:
         self._tree, self._kernels, self._spare = folder / "tree", folder / "kernels", folder / "spare"
         self._tree.mkdir(parents=True)
         for name in COPIED:
+            if not (root / name).exists():
+                continue
             if (root / name).is_dir():
                 shutil.copytree(root / name, self._tree / name, ignore=shutil.ignore_patterns("__pycache__"))
             else:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import json
 import signal
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import httpx
 from websockets.sync.client import connect
+from websockets.typing import Subprotocol
 
 from tests.whole.conftest import Airside, launch
 from tests.whole.test_demo import eventually, picture, radar
 
 PATH = "/api/v1/radars/SMR1/parts"
+FEED = Subprotocol("airside.v1.json")
 
 
 def test_a_listening_client_keeps_its_tracks_over_a_change_of_parts(demo: Airside) -> None:
@@ -26,11 +29,14 @@ def test_a_listening_client_keeps_its_tracks_over_a_change_of_parts(demo: Airsid
         "detect": {**running["detect"], "pfa": 3e-7, "learn_scans": 3},
         "extract": {"name": "manhattan", "min_cells": 2},
     }
-    with connect(f"ws://127.0.0.1:{demo.port}/api/v1/live", subprotocols=["airside.v1.json"]) as feed:  # type: ignore[list-item]
+    # the parts take long to compile: a client that does not listen meanwhile is taken for dead
+    with (
+        ThreadPoolExecutor(1) as pool,
+        connect(f"ws://127.0.0.1:{demo.port}/api/v1/live", subprotocols=[FEED]) as feed,
+    ):
         feed.send(json.dumps({"type": "hello"}))
         feed.send(json.dumps({"type": "subscribe", "topics": ["tracks", "status"]}))
-        answer = httpx.put(demo.url + PATH, json=order, timeout=120)
-        assert answer.status_code == 200, answer.text
+        asked = pool.submit(httpx.put, demo.url + PATH, json=order, timeout=120)
         times: list[float] = []
         swept: list[int] = []
 
@@ -45,7 +51,10 @@ def test_a_listening_client_keeps_its_tracks_over_a_change_of_parts(demo: Airsid
             return False
 
         while not turned():
-            pass
+            if asked.done():
+                assert asked.result().status_code == 200, asked.result().text
+        answer = asked.result()
+        assert answer.status_code == 200, answer.text
         for _ in range(20):
             turned()
     assert times == sorted(times)
