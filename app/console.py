@@ -25,5 +25,10 @@ def one_line(error: BaseException) -> str:
 def any_terminal() -> None:
     """Let signs that the terminal has no code for be shown as "?" instead of ending the command."""
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
+        accept_any_sign(stream)
+
+
+def accept_any_sign(stream: object) -> None:
+    """Have a text stream write "?" for signs that its encoding lacks; other kinds of streams stay as they are."""
+    if isinstance(stream, io.TextIOWrapper):
+        stream.reconfigure(errors="replace")

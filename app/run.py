@@ -1,57 +1,38 @@
-"""From settings to a served service: start-up in steps that a person can follow, and an orderly end."""
+"""From settings to a served service, and its orderly end."""
 
 from __future__ import annotations
 
-import logging
-import signal
 import socket
-import threading
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING
 
 import uvicorn
 from fastapi import APIRouter
 from rich.console import Console
-from rich.logging import RichHandler
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from app.airports import load_airport
 from app.api.application import create_app
 from app.bus import connect_bus
-from app.console import one_line
 from app.contract import ReplayControl, Service
 from app.ingest.mqtt import MqttThread
 from app.live.hub import Hub
+from app.logs import log_to
 from app.private_files import make_private_folder
-from app.secret_urls import MaskedFormatter
 from app.service import SurfaceService
 from app.settings import Settings, SettingsError
+from app.startup import Served, Starter, say
+from app.stopping import STOPPED, end_now, handle_signals
 from app.store.store import Store
 from pipeline.airport.model import Airport
 
 if TYPE_CHECKING:
     from app.view3d import View3D
 
-log = logging.getLogger("airside")
-
-
-class Served(Protocol):
-    """What can be served: an application over a service, with a begin and an end."""
-
-    settings: Settings
-    app: Any
-
-    @property
-    def service(self) -> Service:
-        """What the application shows."""
-
-    def begin(self, step: Callable[[str], None]) -> None:
-        """Start it; `step` hears what is being done. Raises what goes wrong."""
-
-    def end(self) -> None:
-        """Stop everything."""
+STEP_END_S = 0.3
+"""How long the step of the start-up that runs when the service is told to end is waited for: the compiler takes
+longer, everything else less."""
 
 
 class Running:
@@ -142,11 +123,38 @@ def begin_view(view: View3D, service: Service, step: Callable[[str], None], ends
 
 
 def serve(settings: Settings, console: Console, running: Served | None = None) -> int:
-    """Run until SIGINT or SIGTERM; the exit status. running: what is served, a service made of the settings if none."""
-    _log_to(console, settings.log_level)
+    """Run until SIGINT or SIGTERM; the exit status: 0, 1 when it failed, 130 when it was stopped before it was ready.
+
+    running: what is served, a service made of the settings if none. Does not return when it is stopped before it is
+    ready: the process ends, as kernels may be compiling in a thread of it.
+    """
+    log_to(console, settings.log_level, settings.log_format)
     listening = _listen(settings)
     running = running or Running(settings)
-    config = uvicorn.Config(
+    server = uvicorn.Server(_config(running, settings))
+    starter = Starter(running, console, server, listening.getsockname()[1])
+
+    def stop() -> None:
+        server.should_exit = True
+
+    # uvicorn raises the signal that ended it once more, which would end us before the store has drained
+    handle_signals(stop)
+    starter.start()
+    try:
+        server.run(sockets=[listening])
+    finally:
+        starter.join(STEP_END_S)
+        running.end()
+    if starter.failed or not server.started:
+        return 1
+    say(console, settings, "stopped")
+    if not starter.ready:
+        end_now(STOPPED)
+    return 0
+
+
+def _config(running: Served, settings: Settings) -> uvicorn.Config:
+    return uvicorn.Config(
         running.app,
         host=settings.host,
         port=settings.port,
@@ -159,57 +167,6 @@ def serve(settings: Settings, console: Console, running: Served | None = None) -
         timeout_graceful_shutdown=3,
         access_log=False,
     )
-    server = uvicorn.Server(config)
-    failed: list[BaseException] = []
-
-    def start() -> None:
-        try:
-            _begin_aloud(running, console, server, listening.getsockname()[1])
-        except BaseException as error:
-            failed.append(error)
-            log.error("start-up failed: %s", one_line(error), exc_info=settings.log_level == "debug")
-            server.should_exit = True
-
-    # uvicorn raises the signal that ended it once more, which would end us before the store has drained
-    for one in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(one, lambda *_: None)
-    starter = threading.Thread(target=start, name="start-up")
-    starter.start()
-    try:
-        server.run(sockets=[listening])
-    finally:
-        starter.join()
-        running.end()
-    return 1 if failed or not server.started else 0
-
-
-def _begin_aloud(running: Served, console: Console, server: uvicorn.Server, port: int) -> None:
-    begun = time.monotonic()
-    columns = (SpinnerColumn("line"), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=not console.is_terminal) as progress:
-        tasks: list[Any] = []
-
-        def step(text: str) -> None:
-            if tasks:
-                progress.update(tasks[-1], total=1, completed=1)
-            if not console.is_terminal:
-                console.print(f"  {text}")
-            tasks.append(progress.add_task(text, total=None))
-
-        running.begin(step)
-        step("first picture")
-        while not running.service.readiness().ready and not server.should_exit:
-            time.sleep(0.05)
-        progress.update(tasks[-1], total=1, completed=1)
-    if server.should_exit:
-        return
-    settings = running.settings
-    host = "127.0.0.1" if settings.host in ("0.0.0.0", "::") else settings.host
-    console.print(
-        f"\n[bold]Airside[/bold] {running.service.airport.icao} is ready after {time.monotonic() - begun:.1f} s:"
-        f" [bold cyan]http://{host}:{port}[/bold cyan]   (Ctrl-C ends it)\n",
-        highlight=False,
-    )
 
 
 def _listen(settings: Settings) -> socket.socket:
@@ -221,11 +178,3 @@ def _listen(settings: Settings) -> socket.socket:
         raise SettingsError(f"cannot listen on {settings.host}:{settings.port}: {error.strerror}") from error
     opened.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 65536)
     return opened
-
-
-def _log_to(console: Console, level: str) -> None:
-    handler = RichHandler(console=console, show_path=False)
-    handler.setFormatter(MaskedFormatter("%(message)s", "%H:%M:%S"))
-    logging.basicConfig(level=level.upper(), handlers=[handler])
-    for noisy in ("uvicorn.error", "uvicorn.access", "websockets", "alembic", "numba"):
-        logging.getLogger(noisy).setLevel(logging.WARNING)

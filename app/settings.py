@@ -16,6 +16,7 @@ from pydantic_settings import SettingsError as SourceError
 from app.secret_urls import SecretUrl, check_url
 from app.settings_environment import BETWEEN, PREFIX, strays
 from app.settings_faults import explain
+from app.settings_sources import ClockSettings, ClocksSettings, Section, UdpSettings
 from pipeline.track.settings import LARGEST_CAPACITY
 
 log = logging.getLogger(__name__)
@@ -32,54 +33,12 @@ HOST_NAME = re.compile(r"\*|(\*\.)?[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*|[0-9A-Fa-f:
 OWN_PATHS = frozenset({"api", "data", "chunks", "health", "metrics", "3d", "docs", "css", "js"})
 """First parts of the paths of the service: below one of these, a path with and without `root_path` look alike."""
 
+LogFormat = Literal["auto", "text", "json"]
+"""auto: for a person at a terminal, text elsewhere; text: one line an event; json: one JSON object a line."""
+
 
 class SettingsError(ValueError):
     """The settings cannot be used; the message names the key and, where there is one, the nearest right name."""
-
-
-class Section(BaseModel):
-    """A table of the settings file."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)
-
-
-class UdpSettings(Section):
-    """Where a radar's CAT240 datagrams arrive."""
-
-    address: str | None = Field(
-        None, description="local address to listen on; without it udp_address, or every address where a group is joined"
-    )
-    port: int = Field(8600, ge=0, le=65535, description="UDP port; 0 lets the system choose")
-    group: str | None = Field(None, description="multicast group to join")
-    interface: str = Field("0.0.0.0", description="address of the interface on which the group is joined")
-    edition: Literal["1.2", "1.3"] = Field(
-        "1.3", description="edition of CAT240 agreed with the radar, a note: both are read alike (1.2 unverified)"
-    )
-    sac: int | None = Field(None, ge=0, le=255, description="take only this system area code")
-    sic: int | None = Field(None, ge=0, le=255, description="take only this system identification code")
-
-
-class ClockSettings(Section):
-    """How the times that a source states are taken."""
-
-    mode: Literal["auto", "taken", "corrected", "arrival"] = Field(
-        "auto",
-        description="taken: as stated; corrected: the estimated offset of its clock is removed; arrival: stamped with "
-        "the time of arrival; auto: corrected only when latency cannot explain the offset",
-    )
-    max_offset_s: float = Field(
-        5.0, gt=0, description="a report or event further than this from its arrival is refused; video is corrected"
-    )
-    max_latency_s: float = Field(
-        2.0, ge=0, description="a time behind its arrival by less than this counts as latency, not as a wrong clock"
-    )
-
-
-class ClocksSettings(Section):
-    """The clocks of the sources that are not radars."""
-
-    reports: ClockSettings = ClockSettings()
-    nodes: ClockSettings = ClockSettings()
 
 
 class RadarSettings(Section):
@@ -294,6 +253,11 @@ class Settings(BaseSettings):
     )
     udp_address: str = Field("127.0.0.1", description="where radars without an address of their own are heard")
     log_level: Literal["debug", "info", "warning", "error"] = "info"
+    log_format: LogFormat = Field(
+        "auto",
+        description="auto: colours and progress at a terminal, text elsewhere; text: one line an event with date and "
+        "time in UTC; json: one JSON object an event",
+    )
     allowed_hosts: tuple[str, ...] = Field(
         (),
         description="further names under which clients ask for this service, such as the one that a proxy passes on, "

@@ -10,7 +10,8 @@ import numpy as np
 
 from app.demo.sender import DatagramSender
 from app.ingest.udp import VideoReceiver
-from app.settings import RadarSettings, UdpSettings
+from app.settings import RadarSettings
+from app.settings_sources import UdpSettings
 from pipeline.asterix.cat240 import encode_sweeps
 from pipeline.sites import RadarSite
 from pipeline.tables import Sweeps, VideoFormat

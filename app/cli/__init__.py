@@ -4,12 +4,29 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
+from typer.core import TyperGroup
+
+
+class Commands(TyperGroup):
+    """The commands; one that is stopped says so and ends with status 130."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command of a command line."""
+        from app.console import fail
+        from app.stopping import STOPPED
+
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            raise fail("stopped", code=STOPPED) from None
+
 
 app = typer.Typer(
     name="airside",
+    cls=Commands,
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_show_locals=False,
@@ -44,10 +61,16 @@ for _module in pkgutil.iter_modules(__path__):
 def main() -> None:
     """Run the command line (the `airside` script)."""
     from app.console import any_terminal
+    from app.stopping import STOPPED, end_now, stop_on_signals
 
     any_terminal()
+    stop_on_signals()
     try:
         app()
+    except SystemExit as end:
+        if end.code == STOPPED:
+            end_now(STOPPED)  # while the interpreter clears up, a further signal would find no handler any more
+        raise
     except (OSError, ValueError) as error:
         _end(error)
 

@@ -163,8 +163,6 @@ def _replay_video(
         _send(console, recording, found, source_to_send(recording, found, (sac, sic), rewrite, to is None), speed, loop)
     except (Refused, SettingsError, OSError) as error:
         raise fail(str(error)) from error
-    except KeyboardInterrupt:
-        raise typer.Exit(130) from None
 
 
 def _replay_journal(
@@ -200,8 +198,6 @@ def _replay_journal(
             status = work.serve(port, speed)
     except (JournalError, Refused, SettingsError, OSError) as error:
         raise fail(str(error)) from error
-    except KeyboardInterrupt:
-        raise typer.Exit(130) from None
     raise typer.Exit(status)
 
 

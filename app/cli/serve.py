@@ -44,13 +44,16 @@ def demo(settings: SettingsFile = None, port: Port = None, host: Host = None, re
 
 def _run(path: Path | None, mode: str, port: int | None, host: str | None, record: Path | None) -> None:
     from rich.console import Console
+    from rich.markup import escape
 
     from app.console import fail
+    from app.logs import log_to
     from app.settings import SettingsError, load
     from pipeline.airport.geojson import AirportFault
 
     overrides = {"port": port, "host": host, "mode": mode}
     console = Console(stderr=False)
+    log_to(console)
     try:
         settings = load(path, **{key: value for key, value in overrides.items() if value is not None})
         if record is not None:
@@ -59,7 +62,11 @@ def _run(path: Path | None, mode: str, port: int | None, host: str | None, recor
             from app.demo import demo_settings
 
             settings = demo_settings(settings)
-        console.print(f"[bold]Airside[/bold] starts: {settings.airport}, mode {settings.mode}", highlight=False)
+        log_to(console, settings.log_level, settings.log_format)
+        from app.startup import say
+
+        begins = f"starts: {settings.airport}, mode {settings.mode}"
+        say(console, settings, f"Airside {begins}", f"[bold]Airside[/bold] {escape(begins)}")
         from app.run import serve as run
 
         status = run(settings, console)

@@ -9,7 +9,8 @@ import numpy as np
 
 from app.airports import load_airport
 from app.demo.traffic import load_recording
-from app.settings import NodeSettings, RadarSettings, RunwaySettings, Settings, SettingsError, UdpSettings
+from app.settings import NodeSettings, RadarSettings, RunwaySettings, Settings, SettingsError
+from app.settings_sources import UdpSettings
 from pipeline.airport.model import Airport
 from pipeline.lab.simulate.nodes import node_sites
 from pipeline.lab.simulate.recording import Recording, RecordingError

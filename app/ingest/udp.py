@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from app.ingest import socket_kernel
 from app.runtime.host_clock import HostClock
 from app.runtime.refused_video import RefusedVideo
-from app.settings import RadarSettings, UdpSettings
+from app.settings import RadarSettings
+from app.settings_sources import UdpSettings
 from pipeline.assemble import Assembler
 from pipeline.asterix.cat240_batch import FIELDS, VideoBatch
 from pipeline.sites import RadarSite

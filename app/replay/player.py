@@ -35,6 +35,12 @@ LONGEST_PAUSE_S = 3.0
 CATCH_UP_S = 1.0
 """An engine that is further behind the pace asked for goes on from where it is, and does not catch up."""
 
+END_S = 10.0
+"""At the end the thread is waited for so long, as it may hold files open."""
+
+COMPILING_END_S = 0.3
+"""The same before the first picture: it may be compiling kernels, for a minute."""
+
 
 @dataclass
 class _Wanted:
@@ -93,7 +99,7 @@ class JournalPlayer:
             self._ending = True
             self._condition.notify_all()
         if self._thread.is_alive():
-            self._thread.join(10.0)
+            self._thread.join(END_S if self.newest is not None else COMPILING_END_S)
 
     @property
     def alive(self) -> bool:

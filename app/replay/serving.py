@@ -16,6 +16,7 @@ from app.replay.player import JournalPlayer
 from app.replay.recorded import changing, own_verbs, recorded_run
 from app.replay.service import ReplayService
 from app.run import begin_view, make_view, serve
+from app.settings import load
 
 
 class ReplayRunning:
@@ -34,7 +35,8 @@ class ReplayRunning:
         if attached is None:
             raise JournalError(f"{journal.name}: no settings and no map in it")
         run = change(recorded_run(attached, journal.name))
-        self.settings = run.settings.model_copy(update={"port": port, "host": "127.0.0.1", "mode": "replay"})
+        here = {"port": port, "host": "127.0.0.1", "mode": "replay", "log_format": load().log_format}
+        self.settings = run.settings.model_copy(update=here)
         player = JournalPlayer(journal, change, window, speed, own=own_verbs(orders))
         self.service = ReplayService(replace(run, settings=self.settings), player)
         self.hub = Hub(self.service, self.settings)

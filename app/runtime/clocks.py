@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from app.contract import RefusedRow
 from app.runtime.host_clock import HostClock
-from app.settings import ClockSettings
+from app.settings_sources import ClockSettings
 from pipeline.picture import SensorState
 from pipeline.sites import RadarSite
 from pipeline.tables import NodeEvents, Sweeps, TargetReports

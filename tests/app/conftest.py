@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import logging
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -22,3 +24,15 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 def http(server: Server) -> Iterator[httpx.Client]:
     with httpx.Client(base_url=server.url, timeout=20.0) as client:
         yield client
+
+
+@pytest.fixture
+def logging_as_it_was() -> Iterator[None]:
+    """For tests in whose process `app.logs.log_to` is called."""
+    root = logging.getLogger()
+    before, level, hook = list(root.handlers), root.level, threading.excepthook
+    yield
+    root.handlers[:] = before
+    root.setLevel(level)
+    threading.excepthook = hook
+    logging.captureWarnings(False)

@@ -15,7 +15,8 @@ from app.ingest.udp import open_socket
 from app.journal.output import _Stream
 from app.private_files import make_private_file, make_private_folder
 from app.runtime.state_file import write_state
-from app.settings import RadarSettings, SettingsError, UdpSettings
+from app.settings import RadarSettings, SettingsError
+from app.settings_sources import UdpSettings
 from app.store.store import Store
 from tests.support.running import settings_for_tests
 from tests.support.small_airport import small_airport

@@ -22,7 +22,8 @@ from app.ingest.octets import encode_sweeps
 from app.live.hub import Hub
 from app.runtime.host_clock import HostClock
 from app.service import SurfaceService
-from app.settings import NodeSettings, PartSettings, PartsSettings, RadarSettings, Settings, UdpSettings
+from app.settings import NodeSettings, PartSettings, PartsSettings, RadarSettings, Settings
+from app.settings_sources import UdpSettings
 from pipeline.asterix.cat240 import encode_sweeps as encode_datagrams
 from pipeline.picture import AlertChange, Picture, SensorState
 from pipeline.tables import TargetReports, TrackPhase

@@ -18,7 +18,8 @@ from prometheus_client.parser import text_string_to_metric_families
 from app.api.application import create_app
 from app.live.hub import Hub
 from app.service import SurfaceService
-from app.settings import PartSettings, PartsSettings, RadarSettings, Settings, UdpSettings
+from app.settings import PartSettings, PartsSettings, RadarSettings, Settings
+from app.settings_sources import UdpSettings
 from pipeline.asterix.cat240 import encode_sweeps
 from pipeline.picture import SensorState
 from tests.app.runtime.small_radar import AZIMUTHS, RANGES, VIDEO

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import io
+import json
 import os
+import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -16,9 +19,14 @@ from typer.testing import CliRunner
 
 from app.airports import SHIPPED, load_airport
 from app.cli import app
-from app.run import _begin_aloud
 from app.settings import ROOT, load
+from app.startup import Starter
 from tests.support.fake_service import FakeService
+
+NO_DATABASE = "postgresql+psycopg://user:hunter2@127.0.0.1:1/airside"
+"""Nothing listens at port 1."""
+
+pytestmark = pytest.mark.usefixtures("logging_as_it_was")
 
 
 @pytest.fixture(autouse=True)
@@ -110,11 +118,63 @@ def test_any_terminal_will_do(encoding: str) -> None:
     assert b"Z" in called("airport", "list", PYTHONIOENCODING=encoding).stdout
 
 
-def test_the_start_is_told_in_ascii() -> None:
-    told = io.StringIO()
+def told_by_a_start(console: Console) -> None:
     running: Any = SimpleNamespace(service=FakeService(), settings=FakeService().settings)
     running.begin = lambda step: (step("one"), step("two"))
     running.service.readiness = lambda: SimpleNamespace(ready=True)
-    _begin_aloud(running, Console(file=told, force_terminal=True), SimpleNamespace(should_exit=False), 1)  # type: ignore[arg-type]
+    starter = Starter(running, console, SimpleNamespace(should_exit=False), 8123)  # type: ignore[arg-type]
+    starter.run()
+    assert starter.ready
+    assert not starter.failed
+
+
+def test_the_start_is_told_in_ascii() -> None:
+    told = io.StringIO()
+    told_by_a_start(Console(file=told, force_terminal=True))
     assert "is ready" in told.getvalue()
     assert told.getvalue().isascii()
+
+
+def test_outside_a_terminal_the_steps_of_a_start_and_its_end_are_lines_of_the_log(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    told = io.StringIO()
+    with caplog.at_level("INFO"):
+        told_by_a_start(Console(file=told))
+    assert caplog.messages[:3] == ["one", "two", "first picture"]
+    assert re.fullmatch(r"Airside LFPO is ready after \d+\.\d s: http://127\.0\.0\.1:8123", caplog.messages[3])
+    assert told.getvalue() == ""
+
+
+@pytest.mark.parametrize("format", ["text", "json"])
+def test_everything_that_a_start_says_has_the_form_of_the_log(format: str, tmp_path: Path) -> None:
+    data = {"AIRSIDE_DATA_DIR": str(tmp_path), "AIRSIDE_PROT": "8001", "AIRSIDE_PORT": "0"}
+    result = called("serve", AIRSIDE_LOG_FORMAT=format, AIRSIDE_DATABASE_URL=NO_DATABASE, **data)
+    lines = result.stdout.decode().splitlines()
+    if format == "json":
+        told = [json.loads(line)["message"] for line in lines]
+    else:
+        assert all(re.match(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z [A-Z]+ [\w.]+: ", one) for one in lines)
+        told = [line.split(": ", 1)[1] for line in lines]
+    assert told[0].startswith("environment: AIRSIDE_PROT is not a setting")
+    assert told[1] == "Airside starts: LFPO, mode live"
+    assert told[2] == "database: bringing the schema up to date"
+    assert told[3].startswith("start-up failed: ")
+    assert result.returncode == 1
+    assert b"hunter2" not in result.stdout + result.stderr
+
+
+def test_a_command_that_is_told_to_end_says_so_without_a_traceback(tmp_path: Path) -> None:
+    """The kernels are compiled into an empty cache, which takes many times longer than the test waits."""
+    for how in (signal.SIGINT, signal.SIGTERM):
+        with subprocess.Popen(
+            [sys.executable, "-m", "app", "warmup"], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels"), "AIRSIDE_DATA_DIR": str(tmp_path)},
+        ) as process:  # fmt: skip
+            assert process.stdout is not None
+            assert b"compiling the kernels of the chain" in process.stdout.readline()
+            process.send_signal(how)
+            rest, told = process.communicate(timeout=60)
+        assert process.returncode == 130
+        assert rest == b""
+        assert told == b"airside: stopped\n"

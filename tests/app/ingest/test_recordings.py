@@ -20,7 +20,8 @@ from app.ingest.containers.packets import CaptureError
 from app.ingest.recordings import Recording, RecordingError, open_recording
 from app.ingest.replay import Replayer, datagrams_of
 from app.ingest.udp import VideoReceiver
-from app.settings import RadarSettings, UdpSettings
+from app.settings import RadarSettings
+from app.settings_sources import UdpSettings
 from pipeline.asterix.cat240 import encode_sweeps
 from pipeline.sites import RadarSite
 from pipeline.tables import Sweeps, VideoFormat

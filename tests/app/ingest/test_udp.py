@@ -12,7 +12,8 @@ import pytest
 
 from app.ingest import socket_kernel
 from app.ingest.udp import VideoReceiver, warm
-from app.settings import RadarSettings, UdpSettings
+from app.settings import RadarSettings
+from app.settings_sources import UdpSettings
 from pipeline.asterix.cat240 import encode_message, encode_summary, encode_sweeps
 from pipeline.sites import RadarSite
 from pipeline.tables import Sweeps, VideoFormat

@@ -10,7 +10,8 @@ from typer.testing import CliRunner
 from app.cli import app
 from app.ingest.recordings import open_recording
 from app.replay.destination import Destination, find_destination, source_to_send
-from app.settings import RadarSettings, Settings, SettingsError, UdpSettings
+from app.settings import RadarSettings, Settings, SettingsError
+from app.settings_sources import UdpSettings
 from pipeline.asterix.cat240 import VideoMessage, decode
 from tests.app.ingest.test_capture_sources import AZIMUTHS, RANGES, T0, VIDEO, capture, sent
 

@@ -14,7 +14,7 @@ from app.runtime.clocks import (
     RadarTimes,
 )
 from app.runtime.host_clock import HostClock
-from app.settings import ClockSettings
+from app.settings_sources import ClockSettings
 from pipeline.picture import SensorState
 from pipeline.tables import NodeEvents, TargetReports
 from tests.app.runtime.small_radar import small_site, turn
