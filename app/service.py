@@ -339,7 +339,9 @@ class SurfaceService:
         times = self._radar_times[site.id]
         clock = times.words()
         refused = receiver.refused.words() if receiver is not None else ""
-        detail = "; ".join(words for words in (clock, worker.cuts.words(), switch.learning, refused) if words)
+        left_out = receiver.refused.left_out() if receiver is not None else ""
+        told = (clock, worker.cuts.words(), switch.learning, refused, left_out)
+        detail = "; ".join(words for words in told if words)
         status = worker.status
         if (status == "ok" and (clock or refused)) or (status == "waiting" and refused):
             status = "degraded"

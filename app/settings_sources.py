@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from ipaddress import ip_network
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 
 class Section(BaseModel):
@@ -25,8 +26,23 @@ class UdpSettings(Section):
     edition: Literal["1.2", "1.3"] = Field(
         "1.3", description="edition of CAT240 agreed with the radar, a note: both are read alike (1.2 unverified)"
     )
+    sources: tuple[str, ...] = Field(
+        (),
+        description='take datagrams from these addresses and networks only, such as "192.0.2.7" and '
+        '"198.51.100.0/24"; empty: from all',
+    )
     sac: int | None = Field(None, ge=0, le=255, description="take only this system area code")
     sic: int | None = Field(None, ge=0, le=255, description="take only this system identification code")
+
+    @field_validator("sources")
+    @classmethod
+    def _networks(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        for one in value:
+            try:
+                ip_network(one)
+            except ValueError as error:
+                raise ValueError(f'addresses or networks, such as "192.0.2.7" or "198.51.100.0/24": {error}') from None
+        return value
 
 
 class ClockSettings(Section):

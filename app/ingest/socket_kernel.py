@@ -25,6 +25,9 @@ MSG_TRUNC = 0x20
 _WAIT_FOR_ONE = 0x10000
 _MONOTONIC = 1
 _CONTROL = 64
+_ADDRESS = 28
+"""Octets of the longest socket address that is received, struct sockaddr_in6."""
+
 _OVERFLOW = 40
 """SO_RXQ_OVFL: level SOL_SOCKET (1), the count of datagrams that the socket has dropped."""
 
@@ -54,8 +57,8 @@ class Ring:
 
     data: (count, width) uint8. lengths: (count,) int32, at most the width. arrival: (count,) float64 s of
     `time.monotonic`. truncated: (count,) bool, the datagram was longer. After `receive` the first so many rows are
-    filled. dropped:
-    datagrams that the socket had no room for since it was opened, modulo 2**32.
+    filled. senders: (count, 28) uint8, the address of each sender, as the system writes it. dropped: datagrams that the
+    socket had no room for since it was opened, modulo 2**32.
     """
 
     def __init__(self, count: int, width: int) -> None:
@@ -64,6 +67,7 @@ class Ring:
         self.dropped = 0
         self.lengths: NDArray[np.int32] = np.zeros(count, np.int32)
         self.truncated: NDArray[np.bool_] = np.zeros(count, np.bool_)
+        self.senders: NDArray[np.uint8] = np.zeros((count, _ADDRESS), np.uint8)
         self._control = np.zeros((count, _CONTROL), np.uint8)
         self._clock = np.zeros(2, np.int64)
         self._vectors = np.zeros((count, 2), np.uint64)
@@ -73,6 +77,7 @@ class Ring:
         steps = np.arange(count, dtype=np.uint64)
         self._headers["iov"] = self._vectors.ctypes.data + steps * np.uint64(16)
         self._headers["iovlen"] = 1
+        self._headers["name"] = self.senders.ctypes.data + steps * np.uint64(_ADDRESS)
         self._address, self._clock_address = self._headers.ctypes.data, self._clock.ctypes.data
         self._out = (self.lengths, self.truncated, self.arrival)
         self._headers["control"] = self._control.ctypes.data + steps * np.uint64(_CONTROL)
@@ -103,6 +108,7 @@ def _receive(descriptor, headers, address, hold_s, clock, clock_address, out):  
     lengths, truncated, arrival = out
     room = headers.shape[0]
     for i in range(room):
+        headers[i].namelen = _ADDRESS
         headers[i].controllen = _CONTROL
         headers[i].flags = 0
     count = 0

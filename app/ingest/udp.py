@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.ingest import socket_kernel
+from app.ingest.udp_sources import ADDRESS_OCTETS, Sources, packed
 from app.runtime.host_clock import HostClock
 from app.runtime.refused_video import RefusedVideo
 from app.settings import RadarSettings
@@ -58,6 +59,7 @@ class _Receiving(Protocol):
 
     lengths: NDArray[np.int32]
     truncated: NDArray[np.bool_]
+    senders: NDArray[np.uint8]
 
     def receive(self, descriptor: int, hold_s: float) -> int: ...
 
@@ -90,7 +92,8 @@ class VideoReceiver:
         )  # fmt: skip
         self.refused = RefusedVideo(site.id)
         self._counts = dict.fromkeys(("datagrams", "octets", "truncated", "socket_overflow", "socket_errors"), 0)
-        self._counts["deliver_failed"] = 0
+        self._counts |= {"deliver_failed": 0, "refused_source": 0}
+        self._sources = Sources(self._udp.sources)
         warm()
         self._socket: socket.socket | None = None
         self._stopping = threading.Event()
@@ -142,16 +145,23 @@ class VideoReceiver:
                 self._take(ring, got)
 
     def _take(self, ring: _Receiving, got: int) -> None:
-        self.last_heard = time.monotonic()
-        counts, lengths, truncated = self._counts, ring.lengths[:got], ring.truncated[:got]
-        data, arrival = ring.data[:got], self._clock.at(ring.arrival[:got])
+        counts, lengths, good = self._counts, ring.lengths[:got], ~ring.truncated[:got]
         counts["datagrams"] += got
         counts["octets"] += int(lengths.sum())
         counts["socket_overflow"] = ring.dropped
-        if truncated.any():
-            counts["truncated"] += int(truncated.sum())
-            whole = ~truncated
-            data, lengths, arrival = data[whole], lengths[whole], arrival[whole]
+        if self._sources:
+            admitted = self._sources.admitted(ring.senders[:got])
+            counts["refused_source"] += got - int(admitted.sum())
+            counts["truncated"] += int((admitted & ~good).sum())
+            good &= admitted
+        else:
+            admitted = None
+            counts["truncated"] += got - int(good.sum())
+        if admitted is None or admitted.any():
+            self.last_heard = time.monotonic()
+        data, arrival = ring.data[:got], self._clock.at(ring.arrival[:got])
+        if not good.all():
+            data, lengths, arrival = data[good], lengths[good], arrival[good]
         try:
             for block in self._assembler.push_datagrams(data, lengths, arrival):
                 self._deliver(block)
@@ -159,7 +169,7 @@ class VideoReceiver:
             # one bad block must not end the feed of the radar
             counts["deliver_failed"] += 1
             log.exception("radar %s: datagrams could not be worked on", self.site.id)
-        self.refused.note(self.counters(), self._assembler.refusals)
+        self.refused.note(self.counters(), self._assembler.refusals, self._sources.newest_refused)
 
 
 @cache
@@ -184,6 +194,7 @@ class PlainRing:
         self.arrival: NDArray[np.float64] = np.zeros(count)
         self.lengths: NDArray[np.int32] = np.zeros(count, np.int32)
         self.truncated: NDArray[np.bool_] = np.zeros(count, np.bool_)
+        self.senders: NDArray[np.uint8] = np.zeros((count, ADDRESS_OCTETS), np.uint8)
         self.dropped = 0
         self._spare = bytearray(65536)
         self._socket = opened
@@ -194,12 +205,13 @@ class PlainRing:
         for row in range(len(self.data)):
             self._socket.settimeout(TIMEOUT_S if row == 0 else hold_s)
             try:
-                size = self._socket.recv_into(self._spare)
+                size, sender = self._socket.recvfrom_into(self._spare)
             except TimeoutError:
                 return row
             now = time.monotonic()
             begun = begun if row else now
             kept = min(size, width)
+            self.senders[row] = np.frombuffer(packed(sender[0]), np.uint8)
             self.data[row, :kept] = np.frombuffer(self._spare, np.uint8, kept)
             self.lengths[row], self.truncated[row], self.arrival[row] = kept, size > width, now
             if not 0 <= now - begun < hold_s:

@@ -28,6 +28,7 @@ UNREADABLE = {
     "wrong_category": "blocks of other categories than 240",
     "compressed": "video that is compressed in an unknown way",
     "truncated": "datagrams that are too long",
+    "refused_source": "datagrams from addresses that `sources` does not name",
 }
 """Counters of datagrams that cannot be read, and the words for them."""
 
@@ -42,11 +43,12 @@ class RefusedVideo:
         self._lock = threading.Lock()
         self._seen: dict[str, int] = {}
         self._since_log = 0
-        self._why, self._several = "", ""
+        self._why, self._several, self._stranger = "", "", ""
+        self._stranger_at = float("-inf")
         self._refused_at = self._misfit_at = self._taken_at = self._why_at = self._logged_at = float("-inf")
 
-    def note(self, counters: Mapping[str, int], refusals: Refusals) -> None:
-        """Look at the counters, after each batch of datagrams."""
+    def note(self, counters: Mapping[str, int], refusals: Refusals, stranger: str = "") -> None:
+        """Look at the counters, after each batch of datagrams. stranger: the newest address that is not allowed."""
         grown = {name: counters.get(name, 0) - self._seen.get(name, 0) for name in (*MISFITS, *UNREADABLE, "sweeps")}
         self._seen = {name: counters.get(name, 0) for name in grown}
         now = self._clock()
@@ -58,9 +60,13 @@ class RefusedVideo:
                 self._since_log += sum(grown.values())
                 if grown["wrong_geometry"] or grown["wrong_cell_count"]:
                     self._misfit_at = now
-            if now - self._why_at >= WORDS_EVERY_S:
+            if grown["refused_source"]:
+                self._stranger_at = now
+            due = now - self._why_at >= WORDS_EVERY_S
+            self._stranger = stranger if due or not self._stranger else self._stranger
+            if due:
                 self._say(now, grown, refusals)
-            words = self._words(now)
+            words = self._words(now) or self._left_out(now)
             if words and now - self._logged_at >= LOG_EVERY_S:
                 log.warning("radar %s: %d messages %s", self._radar, self._since_log, words)
                 self._logged_at, self._since_log = now, 0
@@ -70,8 +76,19 @@ class RefusedVideo:
         with self._lock:
             return self._words(self._clock())
 
+    def left_out(self) -> str:
+        """Whose datagrams are left out beside those that are taken, for a person; no fault of the radar."""
+        with self._lock:
+            return self._left_out(self._clock())
+
+    def _left_out(self, now: float) -> str:
+        strangers = now - self._stranger_at <= WINDOW_S and now - self._taken_at <= WINDOW_S
+        return f"datagrams from {self._stranger} are left out: not among sources" if strangers else ""
+
     def _say(self, now: float, grown: Mapping[str, int], refusals: Refusals) -> None:
         unreadable = [words for name, words in UNREADABLE.items() if grown[name]]
+        if grown["refused_source"]:
+            unreadable[-1] = f"datagrams from {self._stranger}, which is not among sources"
         why = refusals.words() or " and ".join(unreadable)
         if why:
             self._why, self._why_at = why, now

@@ -5,7 +5,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 import numpy as np
 import pytest
@@ -135,6 +135,32 @@ def test_what_does_not_fit_is_told(receiving: str, caplog: pytest.LogCaptureFixt
     (record,) = [one for one in caplog.records if "refused" in one.getMessage()]
     assert "radar smr" in record.getMessage()
     assert "refused: cells 90, settings say 102" in record.getMessage()
+
+
+def test_only_sources_that_are_named_are_taken_and_others_are_counted_and_told(
+    receiving: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    amplitude, sent = datagrams(64, 16, 1)
+    got: list[Sweeps] = []
+    named, in_network, stranger = "127.0.0.2", "127.0.1.9", "127.0.0.3"
+    with listening(64, 16, got.append, sources=(named, "127.0.1.0/24")) as (receiver, address), ExitStack() as opened:
+        out = {}
+        for one in (named, in_network, stranger):
+            out[one] = opened.enter_context(socket.socket(type=socket.SOCK_DGRAM))
+            out[one].bind((one, 0))
+        for one in sent:
+            out[stranger].sendto(one, address)
+        until(lambda: receiver.counters()["refused_source"] == 64 and receiver.refused.words() != "")
+        assert receiver.last_heard is None
+        assert receiver.refused.words() == "refused: datagrams from 127.0.0.3, which is not among sources"
+        for i, one in enumerate(sent):
+            out[(named, in_network)[i % 2]].sendto(one, address)
+            out[stranger].sendto(one, address)
+        until(lambda: receiver.counters()["refused_source"] == 128 and receiver.counters()["sweeps"] == 64)
+        until(lambda: receiver.refused.words() == "")
+    assert np.array_equal(np.concatenate([block.amplitude for block in got]), amplitude)
+    assert receiver.refused.left_out() == "datagrams from 127.0.0.3 are left out: not among sources"
+    assert "127.0.0.3" in caplog.text
 
 
 def test_a_delivery_that_fails_does_not_end_the_feed() -> None:
