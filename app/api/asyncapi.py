@@ -10,7 +10,7 @@ from pydantic.json_schema import models_json_schema
 
 from app.api import models
 from app.api.feed_models import FROM_CLIENT, TO_CLIENT, AlertMessage
-from app.live.messages import SUBPROTOCOL
+from app.live.messages import SUBPROTOCOL, SUBSCRIPTION_BURST, SUBSCRIPTIONS_PER_S
 
 DESCRIPTION = f"""
 Open the WebSocket with the subprotocol `{SUBPROTOCOL}`, say `hello`, get `welcome`, say `subscribe`, get `result` and
@@ -18,6 +18,12 @@ a snapshot of each topic, then deltas at the granted rate, every alert at once, 
 `heartbeat` when nothing else is sent. To resume after a lost connection, say `hello` with `resume`: the `epoch` and
 `seq` of the last message that was taken after the snapshot, `{{"epoch": ..., "seq": ...}}`; the `result` of the
 subscription says whether the place was recovered.
+
+A later `subscribe` takes the place of the earlier one, at most {SUBSCRIPTIONS_PER_S:g} times a second and
+{SUBSCRIPTION_BURST:g} at once. One that comes sooner is answered by a `result` with `ok` false and changes nothing; a
+client that goes on like that is closed with 1008. Clients with equal filters share one view of the picture; as many
+different filters may be in use at a time as the setting `feed.max_filters` says (100), and a further one is refused
+in the same way.
 
 Closed with 1008 (hostile or silent), 1009 (frame too long), 1013 (too many clients, or more than 10 s behind: try
 again later), 1001 (the service ends).

@@ -24,6 +24,10 @@ FEED: dict[str, tuple[str, dict[str, str]]] = {
         {name: name for name in ("closed_lagging", "refused_full", "refused_origin")} | {"served": "clients_served"},
     ),
     "messages": ("messages of the live feed", {"sent": "messages_sent", "bad": "bad_messages"}),
+    "subscriptions_refused": (
+        "subscriptions that were refused, by reason",
+        {"too_often": "refused_subscriptions", "too_many_filters": "refused_filters"},
+    ),
     "deltas": ("deltas of the live feed", {"encoded": "deltas_encoded", "merged": "merged_deltas"}),
 }
 """The metrics of the live feed: the unit, what it is about, and of each event its counter."""

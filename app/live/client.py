@@ -6,9 +6,19 @@ import asyncio
 from collections import deque
 from collections.abc import Awaitable, Callable
 
+from app.live.allowance import Allowance
 from app.live.hub import Hub
-from app.live.messages import DEFAULT_RATE_HZ, Resume, Subscribe, granted_rate, track_filter
-from app.live.stream import View
+from app.live.messages import (
+    DEFAULT_RATE_HZ,
+    SUBSCRIPTION_BURST,
+    SUBSCRIPTIONS_IN_VAIN,
+    SUBSCRIPTIONS_PER_S,
+    Resume,
+    Subscribe,
+    granted_rate,
+    track_filter,
+)
+from app.live.stream import TooManyViews, View
 from app.wire import Row, encode
 
 REPLIES = 64
@@ -41,6 +51,7 @@ class Client:
         self.ended: Ended | None = None
         self.over = asyncio.Event()
         self._send = send
+        self._changes = Allowance(SUBSCRIPTIONS_PER_S, SUBSCRIPTION_BURST)
         self._view: View | None = None
         self._resume: Resume | None = None
         self._replies: deque[str] = deque()
@@ -56,10 +67,23 @@ class Client:
         self.reply(self.hub.welcome())
 
     def subscribe(self, wanted: Subscribe) -> None:
-        """Begin (or change) what the client gets. Raises BadMessage."""
+        """Begin (or change) what the client gets; what is refused is answered and changes nothing.
+
+        Raises BadMessage, and Ended when the client goes on changing it too often.
+        """
         filter, rate = track_filter(wanted), granted_rate(wanted)
+        left = self._changes.take(self.hub.loop_time())
+        if left < 0:
+            self._refuse(wanted, left)
+            return
+        try:
+            view = self.hub.view(filter, self._view)
+        except TooManyViews as error:
+            self.hub.counters["refused_filters"] += 1
+            self.reply({"type": "result", "id": wanted.id, "ok": False, "error": str(error)})
+            return
         self.leave()
-        self._view = self.hub.view(filter)
+        self._view = view
         self._view.clients += 1
         resume, self._resume = self._resume, None
         place = self.hub.recover(resume, self._view) if resume is not None else None
@@ -75,6 +99,15 @@ class Client:
         else:
             self._snapshot = True
         self.wake()
+
+    def _refuse(self, wanted: Subscribe, left: float) -> None:
+        """Answer a change that comes too soon. left: of the allowance."""
+        self.hub.counters["refused_subscriptions"] += 1
+        limit = f"more than {SUBSCRIPTIONS_PER_S:g} subscriptions a second"
+        if left < -SUBSCRIPTIONS_IN_VAIN:
+            raise Ended(1008, limit)
+        error = f"{limit}: this one changes nothing; the connection is closed when that goes on"
+        self.reply({"type": "result", "id": wanted.id, "ok": False, "error": error})
 
     def leave(self) -> None:
         """Give the view back."""

@@ -72,7 +72,7 @@ class Hub:
         self.picture: Picture | None = None
         self.picture_seq = 0
         keep = settings.feed.resume_s + RESUME_MARGIN_S
-        self.stream = Stream(keep)
+        self.stream = Stream(keep, settings.feed.max_filters)
         self._service = service
         self._lock = threading.Lock()
         self._newest: Picture | None = None
@@ -183,11 +183,11 @@ class Hub:
             "mode": self.settings.mode,
         }
 
-    def view(self, filter: TrackFilter) -> View:
-        """The view of the newest picture through a filter."""
+    def view(self, filter: TrackFilter, instead_of: View | None = None) -> View:
+        """The view of the newest picture through a filter. instead_of: what the client had. Raises TooManyViews."""
         now = self.loop_time()
         self._follow(now)
-        return self.stream.view(filter, now)
+        return self.stream.view(filter, now, instead_of)
 
     def recover(self, resume: Resume, view: View) -> int | None:
         """The place from which a client can go on; None when it needs a snapshot."""
@@ -285,7 +285,7 @@ class Hub:
         back: then every alert is still true and none may be lost.
         """
         self.epoch = secrets.token_hex(4)
-        self.stream = Stream(self.stream.keep_s)
+        self.stream = Stream(self.stream.keep_s, self.stream.max_views)
         if forget_alerts:
             self.recent.clear()
         self._alerts.clear()

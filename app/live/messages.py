@@ -17,6 +17,15 @@ RATES_HZ = (0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 5.0, 8.0, 10.0, 16.0, 20.0, 32.0)
 
 DEFAULT_RATE_HZ = 4.0
 
+SUBSCRIPTIONS_PER_S = 2.0
+"""How often a client may change its subscription: each change costs a snapshot of its own."""
+
+SUBSCRIPTION_BURST = 5.0
+"""Changes at once, for a person who tries several filters."""
+
+SUBSCRIPTIONS_IN_VAIN = 20.0
+"""Changes beyond that, each refused, after which the connection is closed."""
+
 
 class BadMessage(ValueError):
     """The client's message cannot be understood; `id` is what to answer with."""
@@ -38,6 +47,10 @@ class Hello(msgspec.Struct, frozen=True, tag="hello", tag_field="type"):
 
     id: int | str | None = None
     resume: Resume | None = None
+
+
+CLASSES = frozenset({"aircraft", "vehicle", "unknown"})
+"""All of them is as good as none."""
 
 
 class Filter(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -89,7 +102,8 @@ def track_filter(wanted: Subscribe) -> TrackFilter:
         west, south, east, north = box
         if not (-180 <= west <= east <= 180 and -90 <= south <= north <= 90):
             raise BadMessage("filter.bbox must be [west, south, east, north] in degrees", wanted.id)
-    return TrackFilter(frozenset(wanted.filter.classes), box)
+    classes = frozenset(wanted.filter.classes)
+    return TrackFilter(frozenset() if classes == CLASSES else classes, box)
 
 
 def granted_rate(wanted: Subscribe) -> float:

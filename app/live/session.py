@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from app.live.allowance import Allowance
 from app.live.client import Client, Ended
 from app.live.hub import Hub
 from app.live.messages import SUBPROTOCOL, BadMessage, Hello, Ping, Subscribe, decode
@@ -97,17 +98,14 @@ async def _run(websocket: WebSocket, client: Client, hub: Hub) -> Ended | None:
 
 async def _read(websocket: WebSocket, client: Client, hub: Hub) -> None:
     faults, greeted = 0, False
-    allowance, last = REQUEST_BURST, hub.loop_time()
+    allowance = Allowance(REQUESTS_PER_S, REQUEST_BURST)
     while True:
         try:
             async with asyncio.timeout(None if greeted else HELLO_S):
                 data = await _frame(websocket, hub)
         except TimeoutError:
             raise Ended(1008, f"no hello within {HELLO_S:g} s") from None
-        now = hub.loop_time()
-        allowance, last = min(REQUEST_BURST, allowance + (now - last) * REQUESTS_PER_S), now
-        allowance -= 1.0
-        if allowance < 0:
+        if allowance.take(hub.loop_time()) < 0:
             raise Ended(1008, f"more than {REQUESTS_PER_S:g} requests a second")
         try:
             greeted = _answer(data, client, greeted)

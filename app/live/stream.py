@@ -46,11 +46,20 @@ class View:
     idle_since: float = 0.0
 
 
-class Stream:
-    """All track rows with the place (`seq`) of every change. For one thread, the event loop's."""
+class TooManyViews(ValueError):
+    """No further filter can be kept."""
 
-    def __init__(self, keep_s: float) -> None:
+
+class Stream:
+    """All track rows with the place (`seq`) of every change. For one thread, the event loop's.
+
+    keep_s: how long what was is remembered. max_views: views that clients have at a time, besides that of everything,
+    and as many that none has any more.
+    """
+
+    def __init__(self, keep_s: float, max_views: int = 100) -> None:
         self.keep_s = keep_s
+        self.max_views = max_views
         self.seq = 0
         self.rows: dict[int, Row] = {}
         self._changed: dict[int, dict[str, int]] = {}
@@ -89,13 +98,31 @@ class Stream:
         for key in [k for k, v in self._views.items() if not v.clients and now - v.idle_since > self.keep_s]:
             del self._views[key]
 
-    def view(self, filter: TrackFilter, now: float = 0.0) -> View:
-        """The view with this filter, kept from now on if it was not."""
+    def view(self, filter: TrackFilter, now: float = 0.0, instead_of: View | None = None) -> View:
+        """The view with this filter, kept from now on if it was not; one and the same for equal filters.
+
+        instead_of: a view that who asks is about to leave. Raises TooManyViews.
+        """
         found = self._views.get(filter)
+        if found is None or not found.clients:
+            used = sum(one.clients > (one is instead_of) for one in self._views.values())
+            if used > self.max_views:
+                raise TooManyViews(
+                    f"{self.max_views} different filters are in use, which is the limit: take one of them, or none"
+                )
         if found is None:
             found = self._views[filter] = View(filter, self.seq)
+            found.idle_since = now
+            self._forget_idle(found)
         self._look(found, now)
         return found
+
+    def _forget_idle(self, fresh: View) -> None:
+        """Drop the views that are idle for longest until no more than `max_views` are left besides a new one."""
+        idle = [one for one in self._views.values() if not one.clients and one is not fresh]
+        idle.sort(key=lambda one: one.idle_since)
+        for one in idle[: max(0, len(idle) - self.max_views)]:
+            del self._views[one.filter]
 
     def snapshot(self, view: View) -> list[Row]:
         """All rows of a view."""

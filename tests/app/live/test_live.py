@@ -14,6 +14,7 @@ import websockets
 
 from app.api import feed_models
 from app.api.asyncapi import document as asyncapi_document
+from app.live.hub import Hub
 from app.live.messages import BadMessage, Subscribe, decode, granted_rate
 from app.live.session import origin_allowed
 from app.settings import FeedSettings
@@ -348,6 +349,58 @@ async def test_a_flood_of_requests_is_ended(server: Server) -> None:
         with pytest.raises(websockets.ConnectionClosed) as closed:
             await flood(client)
         assert closed.value.rcvd.code == 1008
+
+
+async def test_filters_that_change_too_often_are_refused_and_change_nothing_then_the_connection_ends(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Hub, "loop_time", lambda _: 0.0)  # all within one moment
+    async with live(server.live) as client:
+        await client.subscribe(filter={"classes": ["vehicle"]})
+        for i in range(2, 27):
+            await client.say(type="subscribe", id=i, filter={"bbox": [2.0, 48.0, 2.0 + i / 100, 49.0]})
+        with pytest.raises(websockets.ConnectionClosed) as closed:
+            await client.until("nothing")
+    assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (1008, "more than 2 subscriptions a second")
+    results = [one for one in client.seen if one["type"] == "result"]
+    assert [one["ok"] for one in results] == [True] * 5 + [False] * 20
+    assert all("more than 2 subscriptions a second" in one["error"] for one in results[5:])
+    assert sum(one["type"] == "snapshot" and one["topic"] == "tracks" for one in client.seen) <= 5
+    assert server.hub.counters["refused_subscriptions"] == 21
+
+
+async def test_a_refused_change_leaves_the_subscription_as_it_was(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Hub, "loop_time", lambda _: 0.0)
+    async with live(server.live) as client:
+        await client.subscribe(filter={"classes": ["vehicle"]})
+        for i in range(2, 6):
+            await client.say(type="subscribe", id=i, filter={"classes": ["aircraft"]})
+            assert (await client.until("result"))["ok"]
+        await client.say(type="subscribe", id=6)
+        assert not (await client.until("result"))["ok"]
+        monkeypatch.undo()
+        server.service.step()
+        await client.until("delta")
+        assert {row["class"] for row in client.rows.values()} == {"aircraft"}
+
+
+async def test_equal_filters_share_a_view_and_the_number_of_views_is_bounded() -> None:
+    with running(feed=FeedSettings(max_filters=1)) as server:
+        server.service.step()
+        until(lambda: server.hub.picture is not None, "the first picture is numbered")
+        async with live(server.live) as first, live(server.live) as second, live(server.live) as third:
+            assert (await first.subscribe(filter={"classes": ["vehicle", "aircraft"]}))["ok"]
+            assert (await second.subscribe(filter={"classes": ["aircraft", "vehicle"]}))["ok"]
+            refused = await third.subscribe(filter={"classes": ["aircraft"]})
+            assert not refused["ok"]
+            assert "1 different filters are in use" in refused["error"]
+            assert server.hub.counters["refused_filters"] == 1
+            for wanted in ({}, {"classes": ["unknown", "vehicle", "aircraft"]}):  # everything is no filter
+                await third.say(type="subscribe", id=2, filter=wanted)
+                assert (await third.until("result"))["ok"]
+            assert len({id(one._view) for one in server.hub.clients}) == 2  # type: ignore[attr-defined]
 
 
 async def test_pages_of_other_origins_are_refused(server: Server) -> None:

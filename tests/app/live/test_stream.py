@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.live.stream import Stream, TrackFilter
+from app.live.stream import Stream, TooManyViews, TrackFilter
 
 Row = dict[str, Any]
 CLASSES = ("aircraft", "vehicle", "unknown")
@@ -100,3 +101,33 @@ def test_views_without_clients_are_forgotten() -> None:
     assert stream.view(FILTERS[1], 3.0) is view
     stream.take([], [], 3, 10.0)
     assert stream.view(FILTERS[1], 10.0) is not view
+
+
+def boxes(count: int) -> list[TrackFilter]:
+    return [TrackFilter(bbox=(0.0, 0.0, 1.0 + i, 1.0)) for i in range(count)]
+
+
+def test_views_of_clients_are_bounded_and_one_may_be_exchanged_for_another() -> None:
+    stream = Stream(60.0, max_views=2)
+    first, second, third = boxes(3)
+    for one in (first, second):
+        stream.view(one).clients += 1
+    with pytest.raises(TooManyViews):
+        stream.view(third)
+    assert stream.view(first) is stream.view(first)
+    stream.view(TrackFilter())
+    shared = stream.view(first)
+    shared.clients += 1
+    with pytest.raises(TooManyViews):
+        stream.view(third, instead_of=shared)  # another client keeps it
+    shared.clients -= 1
+    assert stream.view(third, instead_of=shared).filter == third
+
+
+def test_of_views_without_clients_the_newest_are_kept() -> None:
+    stream = Stream(1e9, max_views=3)
+    wanted = boxes(20)
+    made = [stream.view(one, float(i)) for i, one in enumerate(wanted)]
+    assert len(stream._views) <= 1 + 3 + 1
+    assert stream.view(wanted[-2], 20.0) is made[-2]
+    assert stream.view(wanted[0], 20.0) is not made[0]
