@@ -19,6 +19,12 @@ ROOT = Path(__file__).resolve().parent.parent
 KEPT = 3
 """Folders of older sources that stay, so that going back to them compiles nothing."""
 
+SHIPPED = "AIRSIDE_SHIPPED_KERNELS"
+"""The variable that names a folder of compiled kernels that came with the program, as in a Docker image."""
+
+TAKEN = ".shipped"
+"""In a folder: which shipped kernels were copied into it."""
+
 KERNEL = re.compile(rb"^\s*(?:from|import) (?:pipeline\.kernels\.compiled|numba)\b", re.MULTILINE)
 """What a file that holds kernels imports."""
 
@@ -29,7 +35,8 @@ CONSTANTS = re.compile(rb"^from (pipeline[\w.]*) import (?:\([^)]*?|[^(\n]*?)\b[
 def use_kernel_cache() -> None:
     """Point numba to the folder of exactly these sources; of older ones the newest few are kept.
 
-    NUMBA_CACHE_DIR, where it is set, is the folder above it; otherwise `.airside/kernels` beside the sources.
+    NUMBA_CACHE_DIR, where it is set, is the folder above it; otherwise `.airside/kernels` beside the sources. Kernels
+    that came with the program are copied there once.
     """
     if "numba" in sys.modules:
         return
@@ -38,6 +45,8 @@ def use_kernel_cache() -> None:
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
     if not folder.is_dir():
         _make(folder)
+    if SHIPPED in os.environ:
+        _take_shipped(Path(os.environ[SHIPPED]) / digest, folder)
 
 
 def kernel_sources(root: Path = ROOT) -> list[Path]:
@@ -73,3 +82,21 @@ def _make(folder: Path) -> None:
             shutil.rmtree(one, ignore_errors=True)
     except OSError:
         pass  # numba says itself when it cannot write there
+
+
+def _take_shipped(shipped: Path, folder: Path) -> None:
+    """Copy kernels that came with the program over what is kept, unless these very ones were copied before.
+
+    What is kept may be of an older image with the same sources, whose kernels numba no longer takes: it goes by the
+    times of the source files.
+    """
+    try:
+        files = sorted(one for one in shipped.rglob("*") if one.is_file())
+        found = hashlib.sha256(repr([(str(one), one.stat().st_size, one.stat().st_mtime_ns) for one in files]).encode())
+        mark, told = folder / TAKEN, found.hexdigest()
+        if not files or (mark.is_file() and mark.read_text() == told):
+            return
+        shutil.copytree(shipped, folder, dirs_exist_ok=True)
+        mark.write_text(told)
+    except OSError:
+        pass  # then they are compiled

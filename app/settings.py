@@ -9,7 +9,7 @@ import tomllib
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, SecretStr, ValidationError, field_validator, model_validator
 from pydantic_settings import BaseSettings, EnvSettingsSource, PydanticBaseSettingsSource, SettingsConfigDict
 from pydantic_settings import SettingsError as SourceError
 
@@ -128,6 +128,7 @@ class FeedSettings(Section):
     """The live feed."""
 
     max_clients: int = Field(500, ge=1)
+    max_filters: int = Field(100, ge=0, description="different filters of tracks in use at a time")
     max_message_bytes: int = Field(65536, ge=1024)
     lag_limit_s: float = Field(10.0, gt=0, description="a client further behind than this is closed with 1013")
     resume_s: float = Field(60.0, ge=0, description="how far back a client may resume")
@@ -172,6 +173,16 @@ class StorageSettings(Section):
     state_max_age_s: float = Field(
         3600.0, ge=0, description="a detector takes up what it had learned when it is not older than this; 0: never"
     )
+
+
+class PostgresSettings(Section):
+    """PostgreSQL in parts, instead of `database_url`: here a password may hold any sign."""
+
+    host: str = Field("", description="empty: database_url says where the database is")
+    port: int = Field(5432, ge=1, le=65535)
+    user: str = "airside"
+    password: SecretStr = SecretStr("")
+    name: str = Field("airside", description="of the database")
 
 
 class JournalSettings(Section):
@@ -273,6 +284,7 @@ class Settings(BaseSettings):
     feed: FeedSettings = FeedSettings()
     limits: LimitsSettings = LimitsSettings()
     storage: StorageSettings = StorageSettings()
+    postgres: PostgresSettings = PostgresSettings()
     journal: JournalSettings = JournalSettings()
     mqtt: MqttSettings = MqttSettings()
     clocks: ClocksSettings = ClocksSettings()
@@ -302,10 +314,24 @@ class Settings(BaseSettings):
                 raise ValueError('names or addresses without scheme and port, such as "radar.tower.example"')
         return value
 
+    @model_validator(mode="after")
+    def _one_database(self) -> Settings:
+        if self.postgres.host and self.database_url.get_secret_value():
+            raise ValueError("database_url and postgres.host both say where the database is; leave one of them out")
+        return self
+
     @property
     def database(self) -> str:
         """The database URL, password and all, with the embedded default filled in."""
-        return self.database_url.get_secret_value() or f"sqlite:///{(self.data_dir / 'airside.sqlite3').resolve()}"
+        if not self.postgres.host:
+            embedded = f"sqlite:///{(self.data_dir / 'airside.sqlite3').resolve()}"
+            return self.database_url.get_secret_value() or embedded
+        from sqlalchemy import URL
+
+        one = self.postgres
+        password = one.password.get_secret_value() or None
+        made = URL.create("postgresql+psycopg", one.user, password, one.host, one.port, one.name)
+        return made.render_as_string(hide_password=False)
 
     @classmethod
     def settings_customise_sources(

@@ -15,8 +15,9 @@ BETWEEN = "__"
 
 NOT_SETTINGS = frozenset({
     "AIRSIDE_SETTINGS", "AIRSIDE_REQUIRE_SERVICES", "AIRSIDE_COMMAND", "AIRSIDE_PUBLISH", "AIRSIDE_RADAR_PUBLISH",
+    "AIRSIDE_SHIPPED_KERNELS",
 })  # fmt: skip
-"""Variables of the command line, the tests and compose.yaml."""
+"""Variables of the command line, the tests, compose.yaml and the image."""
 
 
 def strays(variables: Mapping[str, str | None], model: type[BaseModel]) -> dict[str, str]:

@@ -13,11 +13,10 @@ from pathlib import Path
 from types import NoneType
 from typing import Any, get_args
 
-from pydantic import BaseModel
+from pydantic import BaseModel, Secret, SecretStr
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from app.secret_urls import SecretUrl
 from app.settings import NodeSettings, PartSettings, PartsSettings, RadarSettings, RunwaySettings, Settings
 from pipeline import parts
 
@@ -107,7 +106,7 @@ def _setting(key: str, field: FieldInfo, path: str) -> Iterator[str]:
     if default is None or default is PydanticUndefined:
         notes.append("not set by default")
         default = _stand_in(field.annotation)
-    if isinstance(default, SecretUrl):
+    if isinstance(default, Secret | SecretStr):
         default = str(default)
     yield from _prose("; ".join(notes))
     yield f"#{key} = {toml_value(default)}"

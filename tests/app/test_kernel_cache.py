@@ -42,6 +42,24 @@ def test_old_folders_go_and_the_newest_stay(tmp_path: Path) -> None:
     assert {one.name for one in tmp_path.iterdir() if one.name.startswith("old")} == {"old3", "old4", "old5"}
 
 
+def test_kernels_that_came_with_the_program_are_copied_once_over_those_of_an_older_one(tmp_path: Path) -> None:
+    digest = folder(NUMBA_CACHE_DIR=str(tmp_path / "volume")).name
+    kept, shipped = tmp_path / "volume" / digest / "kernels", tmp_path / "image" / digest / "kernels"
+    kept.mkdir()
+    shipped.mkdir(parents=True)
+    both = {"NUMBA_CACHE_DIR": str(tmp_path / "volume"), "AIRSIDE_SHIPPED_KERNELS": str(tmp_path / "image")}
+    folder(**both)
+    assert list(kept.iterdir()) == []
+    (kept / "a.nbi").write_text("of an older image")
+    for release in ("first", "second"):
+        (shipped / "a.nbi").write_text(f"of the {release} image")
+        folder(**both)
+        assert (kept / "a.nbi").read_text() == f"of the {release} image"
+        (kept / "a.nbi").write_text("compiled here since")
+        folder(**both)
+        assert (kept / "a.nbi").read_text() == "compiled here since"
+
+
 def test_every_file_that_names_numba_or_a_decorator_of_kernels_counts() -> None:
     counted = {path.relative_to(kernel_cache.ROOT).as_posix() for path in kernel_cache.kernel_sources()}
     for known in ("compiled", "bits", "tiles", "adaptive", "growth", "correlate", "recent_rows", "component_state"):

@@ -8,15 +8,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from pydantic import SecretStr, ValidationError
 from rich.console import Console
+from sqlalchemy import make_url
 from sqlalchemy.exc import SQLAlchemyError
 from typer.testing import CliRunner
 
-from app import run
 from app.bus import connect_bus
 from app.cli import app
+from app.logs import log_to
 from app.secret_urls import check_url, masked_text
-from app.settings import MqttSettings, Settings, SettingsError, load
+from app.settings import MqttSettings, PostgresSettings, Settings, SettingsError, load
 from app.store.database import open_engine
 from tests.support.fake_service import FakeService
 from tests.support.running import until
@@ -31,7 +33,7 @@ def log_of_a_run() -> Iterator[io.StringIO]:
     before, level = root.handlers[:], root.level
     root.handlers = []
     told = io.StringIO()
-    run._log_to(Console(file=told, width=400), "debug")
+    log_to(Console(file=told, width=400), "debug")
     try:
         yield told
     finally:
@@ -67,6 +69,16 @@ def test_settings_show_no_secret_and_keep_it() -> None:
     assert settings.database == f"postgresql+psycopg://a:{SECRET}@db/x"
     assert settings.bus_url.get_secret_value() == f"nats://{SECRET}@bus:4222"
     assert str(settings.bus_url) == "nats://***@bus:4222"
+
+
+def test_a_database_password_of_its_own_is_kept_and_not_shown() -> None:
+    settings = Settings(postgres=PostgresSettings(host="db", password=SecretStr(f"{SECRET}@/")))
+    for shown in (repr(settings), str(settings), settings.model_dump_json(), str(settings.model_dump())):
+        assert SECRET not in shown
+    assert make_url(settings.database).password == f"{SECRET}@/"
+    assert SECRET not in masked_text(settings.database)
+    with pytest.raises(ValidationError, match="leave one of them out"):
+        Settings(postgres=PostgresSettings(host="db"), database_url="postgresql://other/x")
 
 
 @pytest.mark.parametrize("url", [f"nats://me:{SECRET}/x@bus:4222", f"nats://me:{SECRET}", f"nats://[{SECRET}@bus"])

@@ -9,45 +9,11 @@ import subprocess
 from pathlib import Path
 
 import pytest
-import yaml
 
 from app.settings import Settings
+from app.settings_environment import strays
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-
-
-def a_setting(variable: str) -> bool:
-    model: object = Settings
-    for step in variable.removeprefix("AIRSIDE_").lower().split("__"):
-        fields = getattr(model, "model_fields", {})
-        if step not in fields:
-            return False
-        model = type(fields[step].default)
-    return True
-
-
-def test_compose_sets_only_settings_that_exist() -> None:
-    services = yaml.safe_load((ROOT / "compose.yaml").read_text())["services"]
-    fleet = services["airside-fleet"]
-    given = [name for name in fleet["environment"] if name.startswith("AIRSIDE_")]
-    assert len(given) == 3
-    assert [name for name in given if not a_setting(name)] == []
-    assert set(fleet["depends_on"]) <= set(services)
-    assert "profiles" not in services["airside"]
-    assert all(services[name]["profiles"] == ["fleet"] for name in services if name != "airside")
-
-
-def test_the_image_sets_only_settings_that_exist_and_copies_what_is_there() -> None:
-    text = (ROOT / "Dockerfile").read_text()
-    given = set(re.findall(r"(AIRSIDE_[A-Z0-9_]+)=", text))
-    assert given
-    assert all(a_setting(name) for name in given)
-    taken = (ROOT / ".dockerignore").read_text().split("\n")
-    for line in re.findall(r"^COPY (?!--from)(.+)$", text, re.M):
-        for name in line.split()[:-1]:
-            assert (ROOT / name).exists(), name
-            assert f"!{name}" in taken, name
-    assert re.search(r"^USER airside$", text, re.M)
 
 
 def test_the_lock_of_the_display_tools_names_no_host() -> None:
@@ -67,7 +33,7 @@ def test_what_the_readme_points_to_is_there() -> None:
     assert set(pictures) | {"docs/journal.md", "docs/tracker.md"} <= set(links)
     assert [one for one in links if not (ROOT / one).is_file()] == []
     given = set(re.findall(r"\b(AIRSIDE_[A-Z0-9_]+)=", text)) - {"AIRSIDE_SETTINGS"}
-    assert [one for one in given if not a_setting(one)] == []
+    assert strays(dict.fromkeys(given, "1"), Settings) == {}
 
 
 def test_the_files_that_the_documents_name_are_there() -> None:
