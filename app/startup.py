@@ -84,9 +84,9 @@ class Starter(threading.Thread):
         self._running.begin(step)
         step("first picture")
         while not self._running.service.readiness().ready:
-            time.sleep(LOOK_S)
             if self._server.should_exit:
                 raise StartStopped
+            time.sleep(LOOK_S)
 
     def _say_ready(self, seconds: float) -> None:
         settings, icao = self._running.settings, self._running.service.airport.icao

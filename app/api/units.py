@@ -26,7 +26,7 @@ _MESSAGES = (
     "taken", "lost", "duplicate", "reordered", "late", "azimuth_backwards", "wrong_azimuth", "wrong_cell_count",
     "wrong_geometry", "time_backwards", "time_jump", "no_time", "wrong_source", "out_of_sequence", "merged", "summary",
 )  # fmt: skip
-_DATAGRAMS = ("malformed", "wrong_category", "compressed", "truncated", "trailing", "socket_overflow")
+_DATAGRAMS = ("malformed", "wrong_category", "compressed", "truncated", "trailing", "socket_overflow", "refused_source")
 _TRACKS = ("confirmed", "ended", "merged", "identified", "identity_stale", "identity_moved", "no_room", "no_number")
 
 UNITS: Mapping[str, Mapping[str, str]] = {

@@ -40,7 +40,7 @@ class Sources:
         """Mask (n,) of the senders that are allowed. senders: (n, ADDRESS_OCTETS), socket addresses of the system."""
         keys = np.ascontiguousarray(np.delete(senders, [2, 3], axis=1))  # without the port
         distinct, which = np.unique(keys.view(f"V{keys.shape[1]}").ravel(), return_inverse=True)
-        return np.array([self._is_allowed(bytes(one)) for one in distinct], np.bool_)[which]
+        return np.array([self._is_allowed(one.tobytes()) for one in distinct], np.bool_)[which]
 
     def _is_allowed(self, key: bytes) -> bool:
         refused = self._refused.get(key)

@@ -59,6 +59,7 @@ def test_what_a_sensor_counts_stands_under_its_unit(http: httpx.Client, server: 
     ("kind", "name", "unit"),
     [
         ("radar", "octets", "bytes"), ("radar", "datagrams", "datagrams"), ("radar", "truncated", "datagrams"),
+        ("radar", "refused_source", "datagrams"),
         ("radar", "lost", "messages"), ("radar", "missing_sweeps", "sweeps"), ("radar", "cells_detected", "cells"),
         ("radar", "plots_below_min_cells", "plots"), ("radar", "block_failures", "blocks"),
         ("radar", "wrong_cell_count", "messages"), ("radar", "clock_step", OCCURRENCES),
