@@ -331,7 +331,7 @@ class Settings(BaseSettings):
         one = self.postgres
         password = one.password.get_secret_value() or None
         made = URL.create("postgresql+psycopg", one.user, password, one.host, one.port, one.name)
-        return made.render_as_string(hide_password=False)
+        return made.render_as_string(hide_password=False).replace(" ", "%20")  # a space would end what is masked
 
     @classmethod
     def settings_customise_sources(
