@@ -246,11 +246,15 @@ def _quiet() -> Iterator[None]:
 def _server(host: str, port: int) -> Any:
     import viser
     from viser import _client_autobuild, _messages
+    from viser.infra import _infra
+
+    from app.view3d.loopback import answer_loopback_only
 
     # A client may leave between two lines that write to it; that is no news.
     warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
     # viser would run npm when the times of its files look odd, as they do in images and copied environments.
     _client_autobuild.ensure_client_is_built = lambda: None
+    answer_loopback_only(_infra)
     server = viser.ViserServer(host=host, port=port, verbose=False)
     # Any client could ask for a public tunnel to this machine; the button alone can be hidden, the handler not.
     for unwanted in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from app.view3d import View3D
@@ -43,6 +44,30 @@ def test_it_listens_on_loopback_only_and_gives_the_port_away(view: View3D) -> No
     assert view.port is None
     with pytest.raises(OSError):
         socket.create_connection(("127.0.0.1", view._server.get_port()), timeout=2)
+
+
+def _asked(port: int | None, host: str, more: str = "") -> bytes:
+    """The first line of the answer of viser's own port."""
+    with socket.create_connection(("127.0.0.1", port or 0), timeout=10) as client:
+        client.sendall(f"GET / HTTP/1.1\r\nHost: {host}\r\n{more}\r\n".encode())
+        return client.recv(4096).split(b"\r\n")[0]
+
+
+def test_its_own_port_answers_loopback_names_only(view: View3D) -> None:
+    upgrade = (
+        "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+        f"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Protocol: {subprotocol()}\r\n"
+    )
+    for more, good in (("", b"200"), (upgrade, b"101")):
+        for own in ("127.0.0.1", f"localhost:{view.port}", "[::1]:1"):
+            assert good in _asked(view.port, own, more)
+        for foreign in ("evil.example", f"evil.example:{view.port}", "127.0.0.1.evil.example", "", "[", "x@evil"):
+            assert b"403" in _asked(view.port, foreign, more), foreign
+        assert b"403" in _asked(view.port, "evil.example\r\nHost: localhost", more)
+        for origin in ("http://evil.example", "null", f"http://evil.example:{view.port}"):
+            assert b"403" in _asked(view.port, f"127.0.0.1:{view.port}", f"Origin: {origin}\r\n{more}"), origin
+    with pytest.raises(InvalidStatus):
+        connect(f"ws://127.0.0.1:{view.port}", origin="http://evil.example", proxy=None)  # type: ignore[arg-type]
 
 
 def _listening(port: int) -> set[str]:
