@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.logging import RichHandler
 
 from app.console import accept_any_sign
+from app.quiet_log import Sparing
 from app.secret_urls import MaskedFormatter, masked_text
 from app.settings import LogFormat
 
@@ -44,6 +45,7 @@ def log_to(console: Console, level: str = "info", format: LogFormat | None = Non
     else:
         handler = RichHandler(console=console, show_path=False)
         handler.setFormatter(MaskedFormatter("%(message)s", "%H:%M:%S"))
+    handler.addFilter(Sparing())
     logging.basicConfig(level=level.upper(), handlers=[handler], force=True)
     for noisy in NOISY:
         logging.getLogger(noisy).setLevel(logging.WARNING)

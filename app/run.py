@@ -8,7 +8,6 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
-import uvicorn
 from fastapi import APIRouter
 from rich.console import Console
 
@@ -25,6 +24,7 @@ from app.settings import Settings, SettingsError
 from app.startup import Served, Starter, say
 from app.stopping import STOPPED, end_now, handle_signals
 from app.store.store import Store
+from app.web_server import LISTEN_QUEUE, web_server
 from pipeline.airport.model import Airport
 
 if TYPE_CHECKING:
@@ -131,7 +131,7 @@ def serve(settings: Settings, console: Console, running: Served | None = None) -
     log_to(console, settings.log_level, settings.log_format)
     listening = _listen(settings)
     running = running or Running(settings)
-    server = uvicorn.Server(_config(running, settings))
+    server = web_server(running.app, settings, running.app.state.refused)
     starter = Starter(running, console, server, listening.getsockname()[1])
 
     def stop() -> None:
@@ -153,27 +153,11 @@ def serve(settings: Settings, console: Console, running: Served | None = None) -
     return 0
 
 
-def _config(running: Served, settings: Settings) -> uvicorn.Config:
-    return uvicorn.Config(
-        running.app,
-        host=settings.host,
-        port=settings.port,
-        log_config=None,
-        ws="websockets-sansio",
-        ws_max_size=64 * 1024 * 1024,
-        ws_ping_interval=20.0,
-        ws_ping_timeout=20.0,
-        ws_per_message_deflate=settings.feed.compress,
-        timeout_graceful_shutdown=3,
-        access_log=False,
-    )
-
-
 def _listen(settings: Settings) -> socket.socket:
     """The listening socket; connections inherit its small send buffer, by which a client that does not read shows."""
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
     try:
-        opened = socket.create_server((settings.host, settings.port), family=family, backlog=2048)
+        opened = socket.create_server((settings.host, settings.port), family=family, backlog=LISTEN_QUEUE)
     except OSError as error:
         raise SettingsError(f"cannot listen on {settings.host}:{settings.port}: {error.strerror}") from error
     opened.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 65536)

@@ -157,6 +157,8 @@ class LimitsSettings(Section):
     """Bounds on what comes in and on what is queued."""
 
     body_bytes: int = Field(8 * 1024 * 1024, ge=1024)
+    bodies_bytes: int = Field(64 * 1024 * 1024, ge=1024, description="of all bodies together, small ones not counted")
+    connections: int = Field(1024, ge=16, description="at once; fewer where the process may open fewer files")
     node_events_per_request: int = Field(1000, ge=1)
     blocks_queued: int = Field(64, ge=2)
     rows_queued: int = Field(4096, ge=16, description="transactions the database writer may be behind")

@@ -14,6 +14,7 @@ from starlette.responses import Response
 
 from app.api import models, problems
 from app.api.asyncapi import document as asyncapi_document
+from app.api.bodies import Bodies
 from app.api.context import Context, answer
 from app.api.intake import intake_router
 from app.api.metrics import metrics_router
@@ -68,10 +69,11 @@ def create_app(service: Service, *, hub: Hub, store: Store | None, view3d_router
         redirect_slashes=False,
         generate_unique_id_function=operation_id,
     )
+    app.state.refused = context.refused
     problems.install(app)
     app.add_middleware(
         Guard,
-        max_body=settings.limits.body_bytes,
+        bodies=Bodies(settings.limits.body_bytes, settings.limits.bodies_bytes, context.refused),
         allowed_origins=settings.allowed_origins,
         root_path=settings.root_path,
     )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from http import HTTPStatus
 from typing import TYPE_CHECKING, Annotated, Any
@@ -26,13 +27,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Context:
-    """The service and what stands around it. store: None when nothing is kept."""
+    """The service and what stands around it. store: None when nothing is kept.
+
+    refused: how many requests and connections the web server refused or cut, by reason.
+    """
 
     service: Service
     hub: Hub
     store: Store | None
     settings: Settings
     wire: Wire
+    refused: Counter[str] = field(default_factory=Counter)
 
     def stamp(self) -> Row:
         """epoch, seq, time and mode of the newest picture. Raises ApiProblem before the first."""

@@ -72,6 +72,7 @@ class ServiceCollector(Collector):
         if picture is not None:
             yield from _of_picture(picture)
         yield from self._feed()
+        yield self._refused()
         yield from self._store()
 
     def _sensors(self) -> Iterator[Metric]:
@@ -109,6 +110,14 @@ class ServiceCollector(Collector):
             for event, counter in events.items():
                 counts.add_metric([event], hub.counters[counter])
             yield counts
+
+    def _refused(self) -> Metric:
+        refused = CounterMetricFamily(
+            "airside_web_refused", "requests and connections that were refused or cut", labels=["reason"]
+        )
+        for reason, count in self.context.refused.items():
+            refused.add_metric([reason], count)
+        return refused
 
     def _store(self) -> Iterator[Metric]:
         if self.context.store is None:

@@ -1,14 +1,18 @@
-"""What holds for every request: security headers, the limit on bodies, and no writing from foreign pages."""
+"""What holds for every request: security headers, bounds on bodies, plain addresses, no writing from foreign pages."""
 
 from __future__ import annotations
 
+import re
 from typing import Any
+from urllib.parse import unquote_to_bytes
 
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import ClientDisconnect
 from starlette.responses import RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.api.problems import ApiProblem, problem
+from app.api.bodies import CLOSE, Bodies, Body
+from app.api.problems import problem
 from app.api.subpath import below, path_below, root_of
 from app.live.session import origin_allowed
 from app.settings import Settings
@@ -38,6 +42,9 @@ PREFLIGHT = {
     "Access-Control-Max-Age": "86400",
 }
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
+CONTROL = re.compile(rb"[\x00-\x1f\x7f]")
+"""Control characters: no name in an address has one, and a log, a database or a file system may stumble over it."""
+
 WRITING = frozenset({"POST", "PUT", "PATCH", "DELETE"})
 
 
@@ -51,14 +58,14 @@ def allowed_hosts(settings: Settings) -> list[str]:
 
 
 class Guard:
-    """ASGI middleware. max_body: bytes that a request may carry; allowed_origins: further pages that may write.
+    """ASGI middleware. bodies: the bounds on bodies; allowed_origins: further pages that may write.
 
     root_path: below which a proxy serves all of it (`app.api.subpath`). HEAD is answered wherever GET is.
     """
 
-    def __init__(self, app: ASGIApp, max_body: int, allowed_origins: tuple[str, ...], root_path: str = "") -> None:
+    def __init__(self, app: ASGIApp, bodies: Bodies, allowed_origins: tuple[str, ...], root_path: str = "") -> None:
         self.app = app
-        self.max_body = max_body
+        self.bodies = bodies
         self.allowed_origins = allowed_origins
         self.root_path = root_path
 
@@ -83,12 +90,23 @@ class Guard:
         if refusal is not None:
             await refusal(scope, receive, answer)
             return
-        await self.app(scope, self._counted(receive), answer)
+        body = Body(self.bodies, receive, answer)
+        try:
+            await self.app(scope, body.receive, body.send)
+        except ClientDisconnect:
+            # gone in the middle of its body: nobody is left to answer, and nothing of ours has failed
+            self.bodies.refused["body_aborted"] += 1
+        finally:
+            body.end()
 
     def _refusal(self, scope: Scope, headers: Headers) -> Any:
-        length = headers.get("content-length", "0")
-        if length.isdecimal() and int(length) > self.max_body:
-            return problem(413, f"the body may have {self.max_body} bytes", headers={"Connection": "close"})
+        if CONTROL.search(unquote_to_bytes(scope["raw_path"])) or CONTROL.search(
+            unquote_to_bytes(scope["query_string"])
+        ):
+            return problem(400, "the address holds a control character")
+        if self.bodies.refuses(headers.get("content-length", "0")):
+            refused = self.bodies.too_long()
+            return problem(refused.status_code, str(refused.detail), headers=CLOSE)
         if scope["method"] in WRITING and not origin_allowed(
             headers.get("origin"), headers.get("host"), self.allowed_origins
         ):
@@ -98,20 +116,6 @@ class Guard:
                 "have the proxy pass on the Host of the request, or add the origin to allowed_origins in the settings",
             )
         return None
-
-    def _counted(self, receive: Receive) -> Receive:
-        taken = 0
-
-        async def counted() -> Message:
-            nonlocal taken
-            message = await receive()
-            if message["type"] == "http.request":
-                taken += len(message.get("body", b""))
-                if taken > self.max_body:
-                    raise ApiProblem(413, f"the body may have {self.max_body} bytes", headers={"Connection": "close"})
-            return message
-
-        return counted
 
 
 def _short_answer(scope: Scope, path: str) -> Response | None:

@@ -28,6 +28,9 @@ TrackNumber = Annotated[
         "track has ended. null: none are given (tracker.asterix_numbers), or none was free"
     ),
 ]  # fmt: skip
+PLAIN = r"^[^\x00-\x1f\x7f]*$"
+"""Texts without control characters: what people write goes into logs, tables and displays."""
+
 ClassName = Literal["aircraft", "vehicle", "unknown"]
 PhaseName = Literal["tentative", "confirmed", "coasting"]
 SourceName = Literal["radar", "node", "report"]
@@ -302,14 +305,16 @@ class AlertLife(AlertAnswer):
 class Acknowledgement(Model):
     """Who acknowledges."""
 
-    by: str = Field(min_length=1, max_length=64, examples=["TWR-1"])
+    by: str = Field(min_length=1, max_length=64, pattern=PLAIN, examples=["TWR-1"])
 
 
 class RunwayOrder(Model):
     """How a runway is to be used; what is left out stays."""
 
     open: bool | None = None
-    in_use: str | None = Field(None, max_length=8, description='a designator such as "24"; "" for not in use')
+    in_use: str | None = Field(
+        None, max_length=8, pattern=PLAIN, description='a designator such as "24"; "" for not in use'
+    )
     visibility: Literal["normal", "low"] | None = None
 
 

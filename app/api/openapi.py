@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from http import HTTPStatus
 from typing import Any
 
 import msgspec
@@ -12,6 +13,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
 from app.api import models, replay_models
+from app.api.problems import PROBLEM
 from app.ingest.node_events import NodeEventRow
 from app.ingest.target_reports import TargetReportRow
 
@@ -77,11 +79,22 @@ def document(app: FastAPI) -> dict[str, Any]:
         components = made.setdefault("components", {})
         components["schemas"] = dict(sorted({**components.get("schemas", {}), **_more_schemas()}.items()))
         components["securitySchemes"] = SECURITY_SCHEMES
+        for call in (call for calls in made["paths"].values() for call in calls.values()):
+            _declare_refusals(call)
         made["security"] = [{}, {"proxy": []}]
         used = {tag for calls in made["paths"].values() for call in calls.values() for tag in call.get("tags", ())}
         made["tags"] = [{"name": name, "description": about} for name, about in TAGS.items() if name in used]
         app.openapi_schema = made
     return app.openapi_schema
+
+
+def _declare_refusals(call: dict[str, Any]) -> None:
+    """What any call may be answered before it reaches its route: by its address, and by how its body comes in."""
+    statuses = [400] if call.get("parameters") else []
+    statuses += [408, 413, 503] if "requestBody" in call else []
+    for status in statuses:
+        said = {"description": HTTPStatus(status).phrase, "content": {PROBLEM: {"schema": reference("Problem")}}}
+        call["responses"].setdefault(str(status), said)
 
 
 def served_at(made: dict[str, Any], prefix: str) -> dict[str, Any]:

@@ -6,14 +6,14 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, RootModel
 
-from app.api.models import Mode, Model
+from app.api.models import PLAIN, Mode, Model
 
 
 class PartChoice(BaseModel):
     """A part by name; every further member is one of its settings, and what is left out has its default."""
 
     model_config = ConfigDict(extra="allow")
-    name: str = Field(max_length=64)
+    name: str = Field(max_length=64, pattern=PLAIN)
 
 
 class PartsOrder(RootModel[dict[str, PartChoice | str]]):

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import contextlib
+import socket
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import uvicorn
 from fastapi import APIRouter
 
 from app.api.application import create_app
+from app.connections import Connections
 from app.live.hub import Hub
 from app.settings import FeedSettings, LimitsSettings, RadarSettings, Settings
 from app.store.store import Store
+from app.web_server import web_server
 from tests.support.fake_replay import FakeReplay
 from tests.support.fake_service import FakeService
 
@@ -33,6 +36,12 @@ class Server:
     store: Store | None
     port: int
     app: Any
+    connections: Connections
+
+    @property
+    def refused(self) -> Counter[str]:
+        """What the web server refused or cut."""
+        return self.connections.refused
 
     @property
     def url(self) -> str:
@@ -70,16 +79,13 @@ def running(
         store.start()
         service.listen(store.record)
     app = create_app(service, hub=hub, store=store, view3d_router=view3d(service) if view3d is not None else None)
-    config = uvicorn.Config(
-        app, host="127.0.0.1", port=0, log_config=None, ws="websockets-sansio", ws_per_message_deflate=False,
-        timeout_graceful_shutdown=2, access_log=False,
-    )  # fmt: skip
-    server = uvicorn.Server(config)
-    thread = threading.Thread(target=server.run, daemon=True)
+    listening = socket.create_server(("127.0.0.1", 0))
+    server = web_server(app, settings, app.state.refused, graceful_s=2)
+    thread = threading.Thread(target=server.run, args=([listening],), daemon=True)
     thread.start()
     try:
         until(lambda: server.started, "the server starts")
-        yield Server(service, hub, store, server.servers[0].sockets[0].getsockname()[1], app)
+        yield Server(service, hub, store, listening.getsockname()[1], app, server.connections)
     finally:
         server.should_exit = True
         thread.join(15.0)

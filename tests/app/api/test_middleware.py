@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import socket
+import time
 from typing import Any
 
 import httpx
@@ -111,3 +113,31 @@ def test_the_address_listened_on_and_listed_names_are_allowed() -> None:
     for wrong in ("http://tower.example", "tower.example:8000", "*tower", ""):
         with pytest.raises(ValueError, match="without scheme and port"):
             Settings(allowed_hosts=(wrong,))
+
+
+@pytest.mark.parametrize("sign", ["%00", "%0d", "%0a", "%1b", "%7f"])
+def test_control_characters_in_an_address_are_refused(http: httpx.Client, sign: str) -> None:
+    for path in (
+        f"/api/v1/radars/a{sign}/parts", f"/api/v1/radars/smr-1/video.png{sign}", f"/chunks/a{sign}.json",
+        f"/{sign}", f"/api/v1/history/tracks?callsign=A{sign}", f"/api/v1/tracks/1/history?from=1{sign}",
+    ):  # fmt: skip
+        assert http.get(path).status_code == 400, path
+    for path in (f"/api/v1/runways/09{sign}27/state", f"/api/v1/radars/a{sign}/parts"):
+        assert http.put(path, json={"open": False}).status_code == 400, path
+
+
+@pytest.mark.parametrize("sign", ["\0", "\r", "\n", "\x1b", "\x7f", "\ud800"])
+def test_control_characters_in_names_are_refused(http: httpx.Client, sign: str) -> None:
+    def sent(method: str, path: str, value: Any) -> int:
+        content = json.dumps(value)
+        return http.request(method, path, content=content, headers={"content-type": "application/json"}).status_code
+
+    report = {"time": time.time(), "lat": 48.72, "lon": 2.38}
+    for row in ({"callsign": f"A{sign}B"}, {"address": f"4ca{sign}12"}, {"source": f"a{sign}"}):
+        assert sent("POST", "/api/v1/targets/reports", {**report, **row}) in (400, 422), row
+    assert sent("POST", "/api/v1/nodes/events", {"time": time.time(), "node": f"N{sign}1"}) in (400, 422)
+    assert sent("POST", "/api/v1/alerts/1/acknowledge", {"by": f"TWR{sign}1"}) in (400, 422)
+    assert sent("PUT", "/api/v1/runways/09-27/state", {"in_use": f"0{sign}9"}) in (400, 422)
+    assert sent("PUT", "/api/v1/radars/smr-1/parts", {"detect": {"name": f"ca{sign}"}}) in (400, 422)
+    assert sent("PUT", "/api/v1/radars/smr-1/parts", {"detect": f"ca{sign}"}) in (400, 422)
+    assert sent("PUT", "/api/v1/radars/smr-1/parts", {f"det{sign}ect": "ca"}) in (400, 422)
