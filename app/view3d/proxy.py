@@ -20,7 +20,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Protocol
 
-import msgspec
 from fastapi import APIRouter, WebSocket
 from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
@@ -31,10 +30,13 @@ from websockets.typing import Subprotocol
 
 from app.live.session import close_or_cut, origin_allowed
 from app.settings import Settings
+from app.view3d.page_messages import Malformed, Unwanted, check
 
 log = logging.getLogger(__name__)
 
 FRAME_BYTES = 64 * 1024 * 1024
+"""Of what viser sends; what its page may send is bounded by the web server, for the feed and for this."""
+
 FRAMES_QUEUED = 8
 VIEWERS = 16
 OPEN_S = 5.0
@@ -42,12 +44,6 @@ STALL_S = 20.0
 """A page that takes nothing for this long is cut; viser then drops what it kept for it."""
 
 CLOSE_S = 3.0
-
-WANTED = frozenset({
-    "ViewerCameraMessage", "SceneNodeClickMessage", "ScenePointerMessage", "GuiUpdateMessage", "GuiButtonHoldMessage",
-    "CommandTriggerMessage", "GetRenderResponseMessage",
-})  # fmt: skip
-"""What viser's page may say. No uploads, no drags, no request for a public tunnel."""
 
 
 class View(Protocol):
@@ -61,13 +57,6 @@ class View(Protocol):
 
     def count(self, what: str) -> None:
         """Count something that happened at the door."""
-
-
-class _Kind(msgspec.Struct):
-    type: str
-
-
-_kind = msgspec.msgpack.Decoder(_Kind)
 
 
 class Refusal(Exception):
@@ -194,11 +183,11 @@ async def _to_viser(websocket: WebSocket, viser: ClientConnection, view: View) -
         if data is None:
             raise Refusal(1003, "binary frames only")
         try:
-            kind = _kind.decode(data).type
-        except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+            check(data)
+        except Malformed as error:
             view.count("bad_messages")
             raise Refusal(1007, "not a message of the 3D page") from error
-        if kind not in WANTED:
+        except Unwanted:
             view.count("unwanted_messages")
             continue
         await viser.send(data)

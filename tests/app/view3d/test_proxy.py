@@ -7,6 +7,7 @@ import contextlib
 import gzip
 import json
 import logging
+import math
 import socket
 import urllib.error
 import urllib.request
@@ -16,16 +17,18 @@ from typing import Any
 
 import msgspec
 import pytest
-import uvicorn
 from fastapi import FastAPI
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from app.api.bodies import Bodies
 from app.api.middleware import Guard
 from app.settings import Settings
 from app.view3d import proxy
 from app.view3d.proxy import router, subprotocol
+from app.web_server import web_server
+from tests.app.view3d.page_says import camera, click, message, update
 
 
 class FakeView:
@@ -70,14 +73,11 @@ async def door(handler: Handler | None = None, **settings: Any) -> AsyncIterator
     view = FakeView()
     chosen = Settings(**{"mode": "demo", **settings})
     app = FastAPI(redirect_slashes=False)
-    app.add_middleware(Guard, max_body=65536, allowed_origins=chosen.allowed_origins)
+    refused: Counter[str] = Counter()
+    app.add_middleware(Guard, bodies=Bodies(65536, 65536, refused), allowed_origins=chosen.allowed_origins)
     app.include_router(router(view, chosen))
     listening = socket.create_server(("127.0.0.1", 0))
-    config = uvicorn.Config(
-        app, log_config=None, ws="websockets-sansio", ws_max_size=64 * 1024 * 1024, ws_per_message_deflate=False,
-        timeout_graceful_shutdown=2, access_log=False, lifespan="off",
-    )  # fmt: skip
-    server = uvicorn.Server(config)
+    server = web_server(app, chosen, refused, graceful_s=2)
     task = asyncio.create_task(server._serve([listening]))
     while not server.started:  # noqa: ASYNC110 - uvicorn offers no event
         await asyncio.sleep(0.01)
@@ -85,9 +85,9 @@ async def door(handler: Handler | None = None, **settings: Any) -> AsyncIterator
 
     async def default(connection: ServerConnection) -> None:
         await connection.send(b"hello")
-        async for message in connection:
-            made.heard.put_nowait((connection.subprotocol, message))
-            await connection.send(b"echo " + (message if isinstance(message, bytes) else message.encode()))
+        async for heard in connection:
+            made.heard.put_nowait((connection.subprotocol, heard))
+            await connection.send(b"echo " + (heard if isinstance(heard, bytes) else heard.encode()))
 
     async with serve(
         handler or default,
@@ -103,10 +103,6 @@ async def door(handler: Handler | None = None, **settings: Any) -> AsyncIterator
         finally:
             server.should_exit = True
             await asyncio.wait_for(task, 15)
-
-
-def message(kind: str, **fields: Any) -> bytes:
-    return msgspec.msgpack.encode({"type": kind, **fields})
 
 
 async def closed(client: ClientConnection) -> tuple[int | None, str]:
@@ -157,7 +153,7 @@ async def test_frames_pass_both_ways_under_visers_subprotocol() -> None:
     async with door() as at, at.open() as client:
         assert client.subprotocol == subprotocol()
         assert await client.recv() == b"hello"
-        sent = message("GuiUpdateMessage", uuid="x")
+        sent = update(value="Tower")
         await client.send(sent)
         assert await client.recv() == b"echo " + sent
         assert await at.heard.get() == (subprotocol(), sent)
@@ -228,11 +224,13 @@ async def test_when_the_page_goes_viser_is_told() -> None:
         await asyncio.wait_for(gone.wait(), 10)
 
 
-@pytest.mark.parametrize("kind", ["ShareUrlRequest", "ShareUrlDisconnect", "FileTransferStartUpload", "Unheard"])
+@pytest.mark.parametrize(
+    "kind", ["ShareUrlRequest", "ShareUrlDisconnect", "FileTransferStartUpload", "GetRenderResponseMessage", "Unheard"]
+)
 async def test_what_the_page_need_not_say_does_not_pass(kind: str) -> None:
     async with door() as at, at.open() as client:
         await client.send(message(kind))
-        wanted = message("ViewerCameraMessage")
+        wanted = camera()
         await client.send(wanted)
         assert (await at.heard.get())[1] == wanted
         assert at.view.counts["unwanted_messages"] == 1
@@ -241,7 +239,9 @@ async def test_what_the_page_need_not_say_does_not_pass(kind: str) -> None:
 @pytest.mark.parametrize(
     ("data", "code"),
     [(b"", 1007), (b"\xc1\xff\x00", 1007), (msgspec.msgpack.encode([1, 2]), 1007),
-     (msgspec.msgpack.encode({"type": 5}), 1007),
+     (msgspec.msgpack.encode({"type": 5}), 1007), (message("ViewerCameraMessage"), 1007),
+     (camera(wxyz="x"), 1007), (camera(extra=1), 1007), (click(ray_origin=[1]), 1007), (update() + b"x", 1007),
+     (camera()[:-3], 1007), (b"\x91" * 50_000, 1007), (bytes(70_000), 1009),
      (json.dumps({"type": "ViewerCameraMessage"}), 1003)],
 )  # fmt: skip
 async def test_what_is_no_message_closes_the_connection(data: Any, code: int) -> None:
@@ -249,6 +249,20 @@ async def test_what_is_no_message_closes_the_connection(data: Any, code: int) ->
         await client.send(data)
         assert (await closed(client))[0] == code
         assert at.heard.empty()
+
+
+async def test_numbers_that_are_none_and_buttons_that_do_not_exist_are_dropped_and_counted() -> None:
+    made_up = [
+        camera(fov=math.nan), camera(position=[math.inf, 0, 0]), click(instance_index=10**12), click(instance_index=-1),
+        update(visible=False), update(value=None), update(value="x" * 1000), update(value="Tower", __class__="x"),
+    ]  # fmt: skip
+    async with door() as at, at.open() as client:
+        for one in made_up:
+            await client.send(one)
+        for wanted in (camera(), click(), click(instance_index=None), update(value="Follow")):
+            await client.send(wanted)
+            assert (await at.heard.get())[1] == wanted
+        assert at.view.counts["unwanted_messages"] == len(made_up)
 
 
 async def test_viewers_beyond_the_limit_are_sent_away(monkeypatch: pytest.MonkeyPatch) -> None:
