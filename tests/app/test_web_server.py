@@ -109,7 +109,7 @@ def test_heads_that_do_not_end_are_closed_and_live_clients_are_not(
             hurry(monkeypatch)
             assert to_the_end(silent) == b""
             assert to_the_end(half).startswith(b"HTTP/1.1 408 ")
-            assert to_the_end(second).startswith(b"HTTP/1.1 408 ")
+            assert b"HTTP/1.1 408 " in to_the_end(second)
         assert server.refused["head_late"] == 3
         answers(live)
 

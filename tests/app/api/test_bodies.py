@@ -72,7 +72,7 @@ async def test_a_body_that_drips_is_given_up_when_its_time_is_over() -> None:
 
 async def test_all_bodies_together_are_bounded_and_small_ones_are_not_counted() -> None:
     clock = Clock()
-    bodies = Bodies(10**6, 10**6, Counter(), clock)
+    bodies = Bodies(2 * 10**6, 10**6, Counter(), clock)
     first, second = (body(bodies, clock, (0, 500_000 + SMALL_BYTES), (0, 500_000)) for _ in range(2))
     await first.receive()
     await second.receive()
