@@ -95,7 +95,10 @@ def _open_by_movement(
     crossed &= (np.abs(side) <= frames.half[:, None] + 15) & (np.abs(side_before) <= frames.half[:, None] + 15)
     crossed &= np.hypot(*(position - anchor).T) < 80.0
     for hold, row in zip(*np.nonzero(crossed), strict=True):
-        memory.entries.setdefault(int(ids[row]), Entry(int(hold), clock))
+        entry = memory.entries.setdefault(int(ids[row]), Entry(int(hold), clock))
+        if entry.hold != hold and frames.runway[entry.hold] == frames.runway[hold]:
+            # the nearer of two holds on the way to one runway is the one that matters
+            entry.hold, entry.since = int(hold), clock
     memory.ids = ids.astype(np.int64)
     memory.anchors = np.where(moved[:, None], position, anchor)
 

@@ -71,6 +71,22 @@ class Mover:
         )
 
 
+def elongated(along: float, across: float, degrees: float = 0.0) -> np.ndarray[Any, Any]:
+    """A covariance of two coordinates with these standard deviations, its first axis turned so far from the east."""
+    turn = np.radians(degrees)
+    axes = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    return np.asarray(axes @ np.diag([along**2, across**2]) @ axes.T)
+
+
+def _covariance(mover: Mover) -> np.ndarray[Any, Any]:
+    """sd and speed_sd of `extra`: a standard deviation of both coordinates, or the covariance of the two."""
+    whole = np.zeros((4, 4))
+    for first, name, usual in ((0, "sd", 2.0), (2, "speed_sd", 0.7)):
+        given = mover.extra.get(name, usual)
+        whole[first : first + 2, first : first + 2] = given if np.ndim(given) else np.eye(2) * given**2
+    return whole
+
+
 def tracks_at(movers: list[Mover], time: float, noise: np.random.Generator | None = None) -> Tracks:
     rows = [(mover, state) for mover in movers if (state := mover.at(time)) is not None]
     if not rows:
@@ -92,9 +108,7 @@ def tracks_at(movers: list[Mover], time: float, noise: np.random.Generator | Non
             "sources": Source.RADAR,
         }.items()
     }
-    covariance = np.stack(
-        [np.diag([m.extra.get("sd", 2.0) ** 2] * 2 + [m.extra.get("speed_sd", 0.7) ** 2] * 2) for m, _ in rows]
-    )
+    covariance = np.stack([_covariance(mover) for mover, _ in rows])
     return Tracks.build(
         len(rows),
         id=[mover.id for mover, _ in rows],
