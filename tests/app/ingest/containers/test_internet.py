@@ -90,6 +90,53 @@ def test_headers_before_udp_in_ipv6(tmp_path: Path) -> None:
     assert counted(tmp_path / "a", [packet[:44]]) == (0, {"damaged": 1})
 
 
+SIX = bytes(range(100, 132))
+"""Source and destination of IPv6."""
+
+
+def fragments6(payload: bytes, cut: int, identification: int = 7, before: bytes = b"", first: int = 44) -> list[bytes]:
+    """The datagram in fragments of IPv6 (RFC 8200, 4.5). before: headers in front of that of a fragment, of kind `first`."""
+    data = udp(payload, checksum=checksum(payload, SIX))
+    made = []
+    for offset in range(0, len(data), cut):
+        piece = data[offset : offset + cut]
+        header = struct.pack(">BBHI", 17, 0, offset | (offset + cut < len(data)), identification)
+        body = before + header + piece
+        made.append(struct.pack(">IHBB", 6 << 28, len(body), first, 64) + SIX + body)
+    return made
+
+
+LONG = bytes(range(250)) * 8
+OPTIONS = b"\x2c\0" + bytes(6)
+"""A header of hop-by-hop options that a fragment header follows."""
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 0, 1), (1, 2, 0)], ids=str)
+@pytest.mark.parametrize(("before", "first"), [(b"", 44), (OPTIONS, 0)], ids=["alone", "behind options"])
+def test_fragments_of_ipv6_are_put_together(tmp_path: Path, order: tuple[int, ...], before: bytes, first: int) -> None:
+    pieces = fragments6(LONG, 800, before=before, first=first)
+    assert len(pieces) == 3
+    found, counters, _ = read(tmp_path / "a", pcap([(T0, pieces[k]) for k in order], 101))
+    assert [one.payload for one in found] == [LONG]
+    assert dict(counters) == {"packets": 3, "fragments": 3}
+
+
+def test_fragments_of_ipv6_that_belong_to_different_datagrams_are_never_joined(tmp_path: Path) -> None:
+    one, other = fragments6(LONG, 800, 7), fragments6(LONG[::-1], 800, 8)
+    assert counted(tmp_path / "a", [one[0], other[1], one[2]]) == (0, {"fragments_lost": 2})
+    assert counted(tmp_path / "a", [one[0], other[0], one[1], other[1], other[2], one[2]]) == (2, {})
+    elsewhere = [piece[:39] + b"\xff" + piece[40:] for piece in one]
+    assert counted(tmp_path / "a", [one[0], elsewhere[1], one[2]]) == (0, {"fragments_lost": 2})
+
+
+def test_fragments_of_ipv6_are_judged_as_a_whole(tmp_path: Path) -> None:
+    pieces = fragments6(LONG, 800)
+    assert counted(tmp_path / "a", [*pieces[:2], pieces[2][:-1] + b"\0"]) == (0, {"wrong_checksum": 1})
+    assert counted(tmp_path / "a", [pieces[0][:46]]) == (0, {"damaged": 1})
+    tcp = [piece[:40] + b"\x06" + piece[41:] for piece in pieces]
+    assert counted(tmp_path / "a", tcp) == (0, {"not_udp": 3})
+
+
 def test_lengths_that_do_not_fit_are_damage(tmp_path: Path) -> None:
     (packet,) = ipv4(PAYLOAD)
     for wrong in (
