@@ -257,7 +257,7 @@ async def test_merged_deltas_of_a_slow_client_are_told() -> None:
     """A client whose transport has no room gets one merged delta when it has."""
     with running(feed=FeedSettings(heartbeat_s=5.0)) as server:
         server.service.step()
-        gate, sent = asyncio.Event(), []
+        gate, written, sent = asyncio.Event(), asyncio.Event(), []
         from app.live.client import Client
         from app.live.hub import Hub
 
@@ -266,6 +266,7 @@ async def test_merged_deltas_of_a_slow_client_are_told() -> None:
 
         async def send(text: str) -> None:
             sent.append(json.loads(text))
+            written.set()
             if sent[-1]["type"] == "delta":
                 await gate.wait()
 
@@ -279,11 +280,15 @@ async def test_merged_deltas_of_a_slow_client_are_told() -> None:
             hub.publish(server.service.step(start + k), ())
             await asyncio.sleep(0.04)
         assert sum(one["type"] == "delta" for one in sent) == 1
+        before = len(sent)
         gate.set()
-        await asyncio.sleep(0.05)
-        assert [one["type"] for one in sent[-2:]] == ["lagging", "delta"]
-        assert sent[-2]["dropped"] >= 1
-        assert sent[-1]["prev"] == sent[-3]["seq"]
+        while len(sent) < before + 2:
+            written.clear()
+            await written.wait()
+        held, lagging, merged = sent[before - 1 : before + 2]
+        assert (held["type"], lagging["type"], merged["type"]) == ("delta", "lagging", "delta")
+        assert lagging["dropped"] >= 1
+        assert merged["prev"] == held["seq"]
         writer.cancel()
         hub.clients.clear()
         await hub.stop()
