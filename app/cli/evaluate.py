@@ -29,7 +29,8 @@ def evaluate(
         Path | None,
         typer.Option(
             help="A recording: .npz of scans and t for experiments on recorded video, JSON target reports"
-            " (an array or one a line, may be gzipped) for those on recorded reports."
+            " (an array or one a line, may be gzipped) for those on recorded reports, ADS-B rows as `simulate traffic`"
+            " takes them, or a folder of such files, for those on recorded traffic."
         ),
     ] = None,
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the tables as JSON.")] = None,

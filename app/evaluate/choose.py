@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from pipeline.lab import evaluate
-from pipeline.lab.evaluate import Experiment, RecordedReports, RecordedVideo
+from pipeline.lab.evaluate import Experiment, RecordedReports, RecordedTraffic, RecordedVideo
 
 ALL = "all"
 
@@ -32,20 +32,31 @@ def needs_video(kind: type[Any]) -> bool:
 
 def needs_reports(name: str) -> bool:
     """Whether the experiment called so works on recorded target reports; False where there is none of that name."""
+    return _has_field(name, "reports")
+
+
+def needs_traffic(name: str) -> bool:
+    """Whether the experiment called so works on recorded traffic; False where there is none of that name."""
+    return _has_field(name, "traffic")
+
+
+def _has_field(name: str, field: str) -> bool:
     kind = evaluate.experiments().get(name)
-    return kind is not None and any(one.name == "reports" for one in fields(kind))
+    return kind is not None and any(one.name == field for one in fields(kind))
 
 
 def choose(
     name: str, *, quick: bool, trials: int | None, video: RecordedVideo | None,
-    reports: Callable[[], RecordedReports],
+    reports: Callable[[], RecordedReports], traffic: Callable[[], tuple[RecordedTraffic, ...]],
 ) -> Chosen:  # fmt: skip
     """The experiment called `name`, or all of them, short when `quick`, each with so many trials if given.
 
-    video, reports: handed to experiments that work on a recording of them. Raises UnknownExperiment.
+    video, reports, traffic: handed to experiments that work on a recording of them. Raises UnknownExperiment.
     """
     known = evaluate.experiments()
-    given = {one: {"reports": reports()} for one in known if name in (one, ALL) and needs_reports(one)}
+    asked = [one for one in known if name in (one, ALL)]
+    given: dict[str, dict[str, Any]] = {one: {"reports": reports()} for one in asked if needs_reports(one)}
+    given |= {one: {"traffic": traffic()} for one in asked if needs_traffic(one)}
     if name == ALL:
         if not known:
             raise UnknownExperiment("there are no experiments")

@@ -13,13 +13,14 @@ import joblib
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from app.evaluate.choose import ALL, choose, needs_reports
+from app.evaluate.choose import ALL, choose, needs_reports, needs_traffic
 from app.evaluate.circumstances import Circumstances, circumstances
 from app.evaluate.documents import document, markdown
 from app.evaluate.recorded import name_of, recorded_video
 from app.evaluate.reported import recorded_reports, shipped_reports
 from app.evaluate.runs import EvaluationError, Run, carry_out, usable_backend
 from app.evaluate.table import summary, told
+from app.evaluate.traffic import recorded_traffic, shipped_traffic
 from app.output_files import check_writable, json_text, write_whole
 from pipeline.lab.evaluate import Experiment
 
@@ -76,12 +77,14 @@ def run_all(console: Console, options: Options) -> list[str]:
     about = circumstances(options.command)
     file = options.file
     of_reports = file is not None and needs_reports(options.name)
+    of_traffic = file is not None and needs_traffic(options.name)
     chosen = choose(
         options.name,
         quick=options.quick,
         trials=options.trials,
-        video=recorded_video(file) if file is not None and not of_reports else None,
+        video=recorded_video(file) if file is not None and not of_reports and not of_traffic else None,
         reports=partial(recorded_reports, file) if file is not None and of_reports else shipped_reports,
+        traffic=partial(recorded_traffic, file) if file is not None and of_traffic else shipped_traffic,
     )
     if options.report is not None:
         options.report.mkdir(parents=True, exist_ok=True)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from app.evaluate.runs import Run
-from pipeline.lab.evaluate import Experiment, RecordedReports, RecordedVideo, Row
+from pipeline.lab.evaluate import Experiment, RecordedReports, RecordedTraffic, RecordedVideo, Row
 
 TOLD_APART = ("title", "source", "reading", "trials")
 """Fields of an experiment that are told elsewhere than among its settings."""
@@ -71,7 +71,7 @@ def settings_line(experiment: Experiment) -> str:
 
 def plain(value: Any) -> Any:
     """A value as JSON has it; numbers that are not finite become null."""
-    if isinstance(value, RecordedVideo | RecordedReports):
+    if isinstance(value, RecordedVideo | RecordedReports | RecordedTraffic):
         return value.name
     if isinstance(value, Enum):
         return value.name

@@ -22,6 +22,9 @@ from typing import Any, Literal, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.airport.model import Airport
+from pipeline.lab.simulate.recording import Recording
+from pipeline.sites import RadarSite
 from pipeline.tables import TargetReports
 
 Trial = Mapping[str, NDArray[Any]]
@@ -157,6 +160,21 @@ class RecordedReports:
 
     reports: TargetReports
     smoothed: bool = False
+    name: str = field(default="")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedTraffic:
+    """Recorded movements at an airport, handed to an experiment that works on some (its field `traffic`).
+
+    recording: the movements, cleaned. reports: the same as they were received; None when only the movements are known.
+    radar: the one that is simulated there.
+    """
+
+    airport: Airport
+    radar: RadarSite
+    recording: Recording
+    reports: TargetReports | None = None
     name: str = field(default="")
 
 

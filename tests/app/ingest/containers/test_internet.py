@@ -95,7 +95,7 @@ SIX = bytes(range(100, 132))
 
 
 def fragments6(payload: bytes, cut: int, identification: int = 7, before: bytes = b"", first: int = 44) -> list[bytes]:
-    """The datagram in fragments of IPv6 (RFC 8200, 4.5). before: headers in front of that of a fragment, of kind `first`."""
+    """The datagram in fragments of IPv6 (RFC 8200, 4.5). before: headers in front of theirs, of kind `first`."""
     data = udp(payload, checksum=checksum(payload, SIX))
     made = []
     for offset in range(0, len(data), cut):
