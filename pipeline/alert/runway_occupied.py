@@ -14,6 +14,9 @@ from pipeline.contracts.alert import Conflict, Situation
 CAT004_ARRIVAL, CAT004_DEPARTURE = 9, 12
 CAT011_TYPE = 1
 
+MOVING_SPEED = 3.0
+"""m/s; one that has landed and is slower is taken for stopped: nobody can say that it will leave the runway."""
+
 
 @dataclass(frozen=True)
 class RunwayOccupied(RuleSettings):
@@ -22,7 +25,8 @@ class RunwayOccupied(RuleSettings):
     departure_information_s, departure_alarm_s: the stages for a departure, in any visibility (it must abort early).
     departure_acceleration: m/s^2 that a departure is expected to gain. anticipate: who rolls ahead of the arrival does
     not count before the alarm stage, and a departure faster than lead_speed (m/s) not at all, unless the arrival still
-    gains on it. predicted: who cannot stop before the area counts, as information. nearest: at most so many occupants
+    gains on it. vacates_s: nor does one that has landed and still moves, as to its exit, while the arrival needs longer
+    than this to reach it. predicted: who cannot stop before the area counts, as information. nearest: at most so many occupants
     are reported for one mover.
     """
 
@@ -31,6 +35,7 @@ class RunwayOccupied(RuleSettings):
     departure_alarm_s: float = 30.0
     anticipate: bool = True
     lead_speed: float = 41.0
+    vacates_s: float = 45.0
     predicted: bool = True
     nearest: int = 4
 
@@ -62,6 +67,10 @@ class RunwayOccupied(RuleSettings):
             leads = not s.landed[other] and s.speed[other] >= self.lead_speed and drawing_away
             if rolls_ahead and self.anticipate and (stage != "alarm" or leads):
                 continue
+            gap = float(s.along[r, other] - s.along[r, row]) * s.forward(r, row)
+            moves_on = s.landed[other] and s.speed[other] > MOVING_SPEED
+            if moves_on and gap > self.vacates_s * _closing_speed(s, r, row, other):
+                continue  # the one before, on the way to an exit far ahead
             inside = bool(s.occupant[r, other])
             yield self._conflict(
                 s,

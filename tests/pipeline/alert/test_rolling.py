@@ -118,3 +118,17 @@ def test_each_rule_gives_its_types_of_asterix(
     (rule,) = (one for one in RULES if type(one).__module__.endswith(name))
     told = play(monitor(rules=(rule,), runways=runways), movers, 0, 39).changes
     assert {(one.alert.rule, one.alert.cat004_type, one.alert.cat011_type) for one in told} == {(name, *types)}
+
+
+@pytest.mark.parametrize(("speed", "alarms"), [(8.0, False), (0.5, True)], ids=["moves on", "has stopped"])
+def test_one_that_landed_and_is_on_its_way_to_an_exit_far_ahead_is_nothing(speed: float, alarms: bool) -> None:
+    # the one before is 200 m before the far end when the arrival is 15 s out, more than a minute behind it
+    path = [(-100, -8400, 0), (-40, -1400, 0), (0, 900, 0), (20, 1100, 0), (60, 1100 + 40 * speed, 0)]
+    played = play(monitor(), [Mover(5, path, extra={"callsign": "AFR5"}), arrival(1, 40)], -90, 39)
+    assert any(one.alert.stage == "alarm" for one in played.changes) is alarms
+
+
+def test_one_that_landed_and_moves_on_near_the_threshold_is_an_alarm() -> None:
+    path = [(-100, -8400, 0), (-40, -1400, 0), (0, -900, 0), (60, -420, 0)]
+    played = play(monitor(), [Mover(5, path, extra={"callsign": "AFR5"}), arrival(1, 40)], -90, 39)
+    assert any(one.alert.stage == "alarm" for one in played.changes)
