@@ -26,8 +26,8 @@ class RunwayOccupied(RuleSettings):
     departure_acceleration: m/s^2 that a departure is expected to gain. anticipate: who rolls ahead of the arrival does
     not count before the alarm stage, and a departure faster than lead_speed (m/s) not at all, unless the arrival still
     gains on it. vacates_s: nor does one that has landed and still moves, as to its exit, while the arrival needs longer
-    than this to reach it. predicted: who cannot stop before the area counts, as information. nearest: at most so many occupants
-    are reported for one mover.
+    than this to reach it. predicted: who cannot stop before the area counts, as information. nearest: at most so many
+    occupants are reported for one mover.
     """
 
     departure_acceleration: float = 1.5
