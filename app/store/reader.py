@@ -81,7 +81,8 @@ class Reader:
     def alerts(self, state: str | None, first: float | None, last: float | None, limit: int) -> list[Row]:
         """Stored alerts that were raised within the times, newest first. state: "live" for all but cleared."""
         table = schema.alerts
-        wanted = select(table.c.document).where(table.c.airport == self.airport)
+        wanted = select(table.c.document, table.c.worst_stage, table.c.acknowledged_by)
+        wanted = wanted.where(table.c.airport == self.airport)
         if state == "live":
             wanted = wanted.where(table.c.state != "cleared")
         elif state is not None:
@@ -92,7 +93,7 @@ class Reader:
             wanted = wanted.where(table.c.raised_at <= last)
         wanted = wanted.order_by(table.c.raised_at.desc(), table.c.id.desc()).limit(limit)
         with self.engine.connect() as connection:
-            return [msgspec.json.decode(document) for document in connection.scalars(wanted)]
+            return [_alert(row) for row in connection.execute(wanted)]
 
     def alert_changes(self, id: int) -> list[Row]:
         """Every stored step of one alert, in order."""
@@ -100,10 +101,15 @@ class Reader:
         wanted = select(table.c.time, table.c.operation, table.c.document)
         wanted = wanted.where(table.c.airport == self.airport, table.c.alert_id == id).order_by(table.c.change_id)
         with self.engine.connect() as connection:
-            return [
+            steps = [
                 {"time": row.time, "operation": row.operation, "alert": msgspec.json.decode(row.document)}
                 for row in connection.execute(wanted)
             ]
+        worst = "information"
+        for step in steps:  # documents of earlier versions do not tell it
+            worst = "alarm" if step["alert"]["stage"] == "alarm" else worst
+            step["alert"].setdefault("worst_stage", worst)
+        return steps
 
     def last_alert_id(self) -> int:
         """The greatest alert number of this airport; 0 when there is none."""
@@ -131,6 +137,14 @@ class Reader:
         given["sources"] = [SOURCES[one & 7] for one in given["sources"]]
         columns = [given[name] for name in POINT_NAMES]
         return [dict(zip(POINT_NAMES, row, strict=True)) for row in zip(*columns, strict=True)]
+
+
+def _alert(row: Any) -> Row:
+    """A stored alert. Documents of earlier versions lack what its columns tell."""
+    document: Row = msgspec.json.decode(row.document)
+    document["worst_stage"] = row.worst_stage
+    document["acknowledged_by"] = document.get("acknowledged_by") or row.acknowledged_by
+    return document
 
 
 def _track(row: Any) -> Row:

@@ -40,6 +40,8 @@ def alert_row(wire: Wire, change: AlertChange) -> Row:
         "cleared_at": alert.cleared_at,
         "simulated": alert.simulated,
         "document": encode(wire.alert(alert)).decode(),
+        "worst_stage": alert.worst_stage,
+        "acknowledged_by": None if alert.acknowledged_by is None else alert.acknowledged_by[:64],
     }
 
 

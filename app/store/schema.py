@@ -2,8 +2,8 @@
 
 Columns are in the units of the wire and carry them in their names; times are Unix seconds (UTC). The ids of tracks
 begin anew with each run of the service, so a stored track has a `uid` of its own. Its `number` is the last ASTERIX
-track number that it had. Points are clustered by (uid, time): the history of a track is
-one contiguous read.
+track number that it had. Points are clustered by (uid, time): the history of a track is one contiguous read. The
+`stage` of an alert is its last one, `worst_stage` the gravest that it had.
 """
 
 from __future__ import annotations
@@ -88,6 +88,8 @@ alerts = Table(
     Column("cleared_at", Double),
     Column("simulated", Boolean, nullable=False),
     Column("document", Text, nullable=False),
+    Column("worst_stage", String(16), nullable=False, server_default="information"),
+    Column("acknowledged_by", String(64)),
     Index("ix_alerts_raised", "airport", "raised_at"),
     Index("ix_alerts_state", "airport", "state"),
 )

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import signal
 import sqlite3
@@ -154,6 +155,69 @@ def test_every_alert_change_is_stored_and_numbers_go_on(url: str) -> None:
             38.0,
         )
         assert store.close_open_alerts("restart", T0 + 61) == 0
+
+
+def test_an_alert_is_filed_under_its_worst_stage_and_with_who_acknowledged_it(url: str) -> None:
+    service = FakeService()
+    with opened(url) as store:
+        service.listen(store.record)
+        alert = service.raise_alert(now=T0)
+        service.step(T0)
+        service.acknowledge(alert.id, "TWR-1")
+        steps: tuple[dict[str, Any], ...] = (
+            {"stage": "alarm", "worst_stage": "alarm", "state": "ongoing"},
+            {"stage": "information"},
+        )
+        for k, values in enumerate(steps):
+            service.update_alert(alert.id, now=T0 + 1 + k, **values)
+        service.step(T0 + 3)
+        service.clear_alert(alert.id, now=T0 + 4)
+        service.step(T0 + 4)
+    with opened(url) as store, store.engine.connect() as connection:
+        row = connection.execute(select(schema.alerts)).one()
+        assert (row.stage, row.worst_stage, row.acknowledged_by) == ("information", "alarm", "TWR-1")
+        [filed] = store.alerts("cleared", None, None)
+        assert (filed["stage"], filed["worst_stage"], filed["acknowledged_by"]) == ("information", "alarm", "TWR-1")
+
+
+def test_alerts_of_earlier_versions_get_their_worst_stage_from_their_steps(url: str) -> None:
+    migrate(url, "0003")
+    engine = open_engine(url)
+    airport = small_airport().icao
+    lives: dict[int, list[tuple[str, str, str | None]]] = {
+        1: [("raise", "information", None), ("acknowledge", "information", "TWR-1"), ("update", "alarm", None),
+            ("clear", "information", None)],
+        2: [("raise", "information", None), ("clear", "information", None)],
+    }  # fmt: skip
+    with engine.begin() as connection:
+        for id, steps in lives.items():
+            for operation, stage, name in steps:
+                document = json.dumps({"id": id, "stage": stage, "raised_at": T0, "acknowledged_by": name})
+                connection.execute(
+                    text(
+                        "INSERT INTO alert_changes (airport, alert_id, time, operation, stage, state, document) "
+                        "VALUES (:airport, :id, 0, :operation, :stage, 'new', :document)"
+                    ),
+                    {"airport": airport, "id": id, "operation": operation, "stage": stage, "document": document},
+                )
+            connection.execute(
+                text(
+                    "INSERT INTO alerts (airport, id, mode, rule, stage, state, raised_at, updated_at, simulated, document)"
+                    " VALUES (:airport, :id, 'live', 'hold_entry', :stage, 'cleared', :at, :at, true, :document)"
+                ),
+                {"airport": airport, "id": id, "stage": stage, "at": T0, "document": document},
+            )
+    engine.dispose()
+    with opened(url) as store:
+        found = store.alerts(None, None, None)
+        assert [(one["id"], one["worst_stage"], one["acknowledged_by"]) for one in found] == [
+            (2, "information", None),
+            (1, "alarm", "TWR-1"),
+        ]
+        assert [one["alert"]["worst_stage"] for one in store.alert_changes(1)] == [
+            "information", "information", "alarm", "alarm",
+        ]  # fmt: skip
+        assert store.alert_changes(1)[-1]["alert"]["stage"] == "information"
 
 
 def test_node_events_and_sensor_states(url: str) -> None:
