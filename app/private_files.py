@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import logging
 import os
+import stat
 import tempfile
 from pathlib import Path
 
 from app.settings import SettingsError
 
+log = logging.getLogger(__name__)
+
 FOLDER_MODE = 0o700
 FILE_MODE = 0o600
+OTHERS = 0o077
+"""The rights of anybody but the user."""
 
 
 def make_private_folder(path: Path, setting: str) -> None:
     """Make a folder for this user alone; one that is there keeps its mode, and must be one that can be written.
 
-    setting: that names it. Raises SettingsError.
+    One that others may enter is warned of. setting: that names it. Raises SettingsError.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -24,6 +30,13 @@ def make_private_folder(path: Path, setting: str) -> None:
             pass
     except OSError as error:
         raise SettingsError(f"{setting}: {path}: cannot be written: {error.strerror}") from error
+    mode = stat.S_IMODE(path.stat().st_mode)
+    if mode & OTHERS:
+        log.warning(
+            "%s: other users of this machine may enter %s (mode %04o), where positions and alerts are kept; "
+            "chmod 700 %s keeps them out",
+            setting, path, mode, path,
+        )  # fmt: skip
 
 
 def make_private_file(path: Path) -> None:

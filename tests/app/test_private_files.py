@@ -47,6 +47,27 @@ def test_the_database_with_its_log_is_private(tmp_path: Path) -> None:
     assert set(files.values()) == {0o600}
 
 
+@pytest.mark.parametrize("there", [False, True])
+def test_a_private_folder_is_not_warned_of(there: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    folder = tmp_path / "data"
+    if there:
+        folder.mkdir(mode=0o700)
+    make_private_folder(folder, "data_dir")
+    assert not caplog.records
+
+
+def test_files_in_a_folder_open_to_others_are_private(tmp_path: Path) -> None:
+    tmp_path.chmod(0o755)
+    store = Store(f"sqlite:///{tmp_path / 'airside.sqlite3'}", settings_for_tests(), small_airport())
+    store.start()
+    store.close_open_alerts("restart", 0.0)
+    files = {one.name: mode(one) for one in tmp_path.iterdir()}
+    store.stop()
+    write_state(tmp_path / "state" / "one.npz", {"a": np.zeros(3)}, 0.0, "live")
+    assert set(files.values()) == {0o600}
+    assert mode(tmp_path / "state") == 0o700
+
+
 def test_states_and_journals_are_private(tmp_path: Path) -> None:
     write_state(tmp_path / "state" / "one.npz", {"a": np.zeros(3)}, 0.0, "live")
     assert mode(tmp_path / "state") == 0o700
@@ -63,10 +84,16 @@ def test_a_file_of_an_earlier_version_becomes_private_and_keeps_what_is_in_it(tm
     assert (mode(file), file.read_bytes()) == (0o600, b"kept")
 
 
-def test_a_folder_that_is_there_keeps_its_mode(tmp_path: Path) -> None:
-    tmp_path.chmod(0o755)
+@pytest.mark.parametrize("open_to", [0o755, 0o750, 0o701])
+def test_a_folder_that_is_there_keeps_its_mode_and_is_warned_of(
+    open_to: int, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    tmp_path.chmod(open_to)
     make_private_folder(tmp_path, "data_dir")
-    assert mode(tmp_path) == 0o755
+    assert mode(tmp_path) == open_to
+    [warning] = [one.getMessage() for one in caplog.records]
+    assert f"data_dir: other users of this machine may enter {tmp_path} (mode {open_to:04o})" in warning
+    assert f"chmod 700 {tmp_path}" in warning
     assert list(tmp_path.iterdir()) == []
     with pytest.raises(SettingsError, match="data_dir"):
         make_private_folder(Path("/proc/airside"), "data_dir")
