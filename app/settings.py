@@ -211,6 +211,7 @@ class MqttSettings(Section):
 
     url: SecretUrl | None = Field(None, description="mqtt://user:password@host:1883, or mqtts://...")
     topic: str = "airside/nodes/+/events"
+    client_id: str = Field("", max_length=64, description="of this service alone; empty: made of the other settings")
 
     @field_validator("url")
     @classmethod

@@ -63,7 +63,10 @@ UNITS: Mapping[str, Mapping[str, str]] = {
 FEEDS = {"node": "events", "report": "reports"}
 """What the feeds count, but for the steps of their clocks."""
 
-MQTT_OCCURRENCES = ("mqtt_connects", "mqtt_connect_failures", "mqtt_ended")
+MQTT_OCCURRENCES = (
+    "mqtt_connects", "mqtt_connect_failures", "mqtt_disconnects", "mqtt_ended", "mqtt_sessions_lost",
+    "mqtt_subscriptions_refused",
+)  # fmt: skip
 
 
 def unit_of(kind: str, name: str) -> str:

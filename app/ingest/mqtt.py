@@ -1,87 +1,115 @@
-"""Pavement nodes that speak MQTT: JSON events on `airside/nodes/<id>/events` go the way of the REST ones."""
+"""Pavement nodes that speak MQTT: JSON events on `airside/nodes/<id>/events` go the way of the REST ones.
+
+The session is kept by the broker while this client is away, so that what nodes send with QoS 1 meanwhile arrives when
+it is back. A message is acknowledged to the broker when it is taken or found to be wrong, not before.
+"""
 
 from __future__ import annotations
 
-import asyncio
+import hashlib
 import logging
-import random
 import threading
-from collections import Counter
+import time
+from collections import Counter, OrderedDict
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol
 from urllib.parse import unquote, urlsplit
 
-import aiomqtt
+import paho.mqtt.client as paho
+from paho.mqtt.enums import CallbackAPIVersion
 
 from app.contract import Refused, RefusedRow, RefusedTime, Submitted
 from app.ingest.node_events import parse_node_events
 from app.ingest.wire_json import BadMessage
-from app.settings import MqttSettings
+from app.settings import MqttSettings, Settings
 from pipeline.sites import NodeSite
 from pipeline.tables import NodeEvents
 
 log = logging.getLogger(__name__)
 
-FIRST_WAIT_S = 0.5
-LONGEST_WAIT_S = 30.0
+FIRST_WAIT_S, LONGEST_WAIT_S = 1, 2
+"""Between two attempts to connect. With CONNECT_S it is back within 5 s of the broker's return."""
+
+CONNECT_S = 2.5
+"""An attempt to connect is given up after this long: a host that is gone gives no answer at all."""
+
+KEEPALIVE_S = 5
+"""A connection on which nothing came for this long is tried out, and given up when nothing comes for as long again."""
+
+RETRY_S = 0.1
+"""A message for which there is no room is offered again after this long; the broker keeps those that follow."""
+
+KEPT_AT_MOST_S = 86_400.0
+"""A day: events that the broker kept while no service ran are taken for true up to this age."""
+
+RECENT = 4096
+"""Messages by which one that is delivered once more is known; brokers have 20 to 100 unacknowledged ones on the way."""
+
+QUICK_S, QUICK_TIMES = 10.0, 3
+"""A connection lost within so many seconds, so many times in a row: most likely two clients have one id."""
+
 MESSAGE_LIMIT = 1000
 MESSAGE_BYTES = 256 * 1024
-QUEUED = 10_000
 
 Submit = Callable[[NodeEvents], Submitted]
 
 
 class _Service(Protocol):
     nodes: tuple[NodeSite, ...]
+    keep_node_events: Callable[[NodeEvents], None]
+    """Stores events without showing them."""
 
     def submit_node_events(self, events: NodeEvents) -> Submitted: ...
 
 
-async def listen(
-    settings: MqttSettings, nodes: Sequence[NodeSite], submit: Submit, counters: Counter[str] | None = None
-) -> None:
-    """Subscribe and pass on events for ever; connects again with growing waits.
+class Away(NamedTuple):
+    """From when to when (UTC s) the broker kept what was sent."""
 
-    Bad messages are counted by reason in `counters` and logged once a reason. Ends only by cancellation. Raises
-    ValueError when the settings have no URL or one that is not mqtt:// or mqtts://.
+    since: float
+    until: float
+
+
+def client_id(settings: Settings, icao: str) -> str:
+    """The id by which the broker knows this service again; the same at each start with the same settings.
+
+    Without `mqtt.client_id` it is made of airport, data folder, port and topic, in 23 letters and digits, which every
+    broker takes.
     """
-    counted: Counter[str] = Counter() if counters is None else counters
-    address = parse_url(_plain(settings))
-    wait = FIRST_WAIT_S
-    while True:
-        try:
-            async with aiomqtt.Client(
-                hostname=address.host,
-                port=address.port,
-                username=address.username,
-                password=address.password,
-                tls_params=aiomqtt.TLSParameters() if address.secure else None,
-                max_queued_incoming_messages=QUEUED,
-                timeout=10.0,
-            ) as client:
-                await client.subscribe(settings.topic, qos=1)
-                counted["connects"] += 1
-                wait = FIRST_WAIT_S
-                log.info("mqtt: listening to %s on %s:%d", settings.topic, address.host, address.port)
-                async for message in client.messages:
-                    _take(str(message.topic), message.payload, settings.topic, nodes, submit, counted)
-        except aiomqtt.MqttError as error:
-            counted["connect_failures"] += 1
-            log.warning("mqtt: %s:%d: %s; again in %.1f s", address.host, address.port, error, wait)
-        # the jitter keeps many clients from coming back at once
-        await asyncio.sleep(wait * random.uniform(0.8, 1.2))
-        wait = min(2 * wait, LONGEST_WAIT_S)
+    if settings.mqtt.client_id:
+        return settings.mqtt.client_id
+    place = f"{settings.data_dir.absolute()} {settings.port} {settings.mqtt.topic}"
+    letters = "".join(one for one in icao if one.isascii() and one.isalnum())[:4]
+    return f"airside{letters}{hashlib.sha256(place.encode()).hexdigest()}"[:23]
 
 
 class MqttThread:
-    """`listen` in a thread with its own event loop, for the service."""
+    """Listens in a thread of its own, and connects again for as long as it runs.
 
-    def __init__(self, settings: MqttSettings, service: _Service) -> None:
-        parse_url(_plain(settings))
-        self._settings, self._service = settings, service
+    client_id: by which the broker knows it again. late_s: an event this much older than its arrival that the broker
+    kept is stored, but not shown: the picture is of now. Raises ValueError when the settings have no URL or one that is
+    not mqtt:// or mqtts://.
+    """
+
+    def __init__(
+        self,
+        settings: MqttSettings,
+        service: _Service,
+        client_id: str,
+        late_s: float = 5.0,
+        keepalive_s: int = KEEPALIVE_S,
+    ) -> None:
+        self._address = parse_url(settings.url.get_secret_value() if settings.url is not None else None)
+        self._topic, self._service, self._id = settings.topic, service, client_id
+        self._late_s, self._keepalive_s = late_s, keepalive_s
         self._counted: Counter[str] = Counter()
-        self._loop = asyncio.new_event_loop()
-        self._task: asyncio.Task[None] | None = None
+        self._recent: OrderedDict[bytes, None] = OrderedDict()
+        self._over = threading.Event()
+        self._connected_at: float | None = None
+        self._lost_at: float | None = None
+        self._quick = 0
+        self._told = False
+        self._away: Away | None = None
+        self._client = self._made()
         self._thread = threading.Thread(target=self._run, name="mqtt", daemon=True)
 
     def start(self) -> None:
@@ -89,37 +117,142 @@ class MqttThread:
         self._thread.start()
 
     def stop(self) -> None:
-        """End; waits at most a few seconds."""
-        if self._thread.is_alive():
-            self._loop.call_soon_threadsafe(self._cancel)
-            self._thread.join(5.0)
+        """End; waits at most a few seconds. The broker goes on keeping the session."""
+        self._over.set()
+        for _ in range(10):
+            self._client.disconnect()
+            self._thread.join(0.5)
+            if not self._thread.is_alive():
+                return
 
     def counters(self) -> dict[str, int]:
         """Messages and events taken, and what was not by reason."""
-        return {f"mqtt_{name}": count for name, count in sorted(self._counted.items())}
+        return {f"mqtt_{name}": count for name, count in sorted(self._counted.copy().items())}
+
+    def _made(self) -> paho.Client:
+        address = self._address
+        client = paho.Client(CallbackAPIVersion.VERSION2, client_id=self._id, clean_session=False, manual_ack=True)
+        client.connect_timeout = CONNECT_S
+        client.reconnect_delay_set(FIRST_WAIT_S, LONGEST_WAIT_S)
+        if address.username is not None:
+            client.username_pw_set(address.username, address.password)
+        if address.secure:
+            client.tls_set()
+        client.on_connect, client.on_connect_fail = self._on_connect, self._on_connect_fail
+        client.on_disconnect, client.on_message = self._on_disconnect, self._on_message
+        client.on_subscribe = self._on_subscribe
+        client.connect_async(address.host, address.port, self._keepalive_s)
+        return client
 
     def _run(self) -> None:
-        asyncio.set_event_loop(self._loop)
-        self._task = self._loop.create_task(
-            listen(self._settings, self._service.nodes, self._service.submit_node_events, self._counted)
-        )
         try:
-            self._loop.run_until_complete(self._task)
-        except asyncio.CancelledError:
-            pass
+            self._client.loop_forever(retry_first_connection=True)
         except Exception:
             log.exception("mqtt: the listener ended")
             self._counted["ended"] += 1
-        finally:
-            self._loop.close()
 
-    def _cancel(self) -> None:
-        if self._task is not None:
-            self._task.cancel()
+    def _on_connect(self, client: paho.Client, _data: Any, flags: Any, reason: Any, _properties: Any) -> None:
+        if reason.is_failure:
+            self._failed(str(reason))
+            return
+        now = time.time()
+        if flags.session_present:
+            lost_at = self._lost_at
+            since = now - KEPT_AT_MOST_S if lost_at is None else lost_at - 2 * self._keepalive_s
+            self._away = Away(since, now)
+        elif self._lost_at is not None:
+            self._counted["sessions_lost"] += 1
+            log.warning("mqtt: the broker has not kept the session; what was sent meanwhile may be lost")
+        client.subscribe(self._topic, qos=1)
+        self._connected_at, self._told = time.monotonic(), False
 
+    def _on_subscribe(self, _client: paho.Client, _data: Any, _mid: int, reasons: Any, _properties: Any) -> None:
+        if any(one.is_failure for one in reasons):
+            self._counted["subscriptions_refused"] += 1
+            log.error("mqtt: the broker does not let this client listen to %s", self._topic)
+            return
+        self._counted["connects"] += 1
+        log.info("mqtt: listening to %s on %s:%d as %s", self._topic, self._address.host, self._address.port, self._id)
 
-def _plain(settings: MqttSettings) -> str | None:
-    return settings.url.get_secret_value() if settings.url is not None else None
+    def _on_connect_fail(self, _client: paho.Client, _data: Any) -> None:
+        self._failed("no connection")
+
+    def _failed(self, why: str) -> None:
+        """Count an attempt that failed; the first in a row is told."""
+        self._counted["connect_failures"] += 1
+        if not self._told and not self._over.is_set():
+            self._told = True
+            host, port = self._address.host, self._address.port
+            log.warning("mqtt: %s:%d: %s; tried again every %d s", host, port, why, LONGEST_WAIT_S)
+
+    def _on_disconnect(self, _client: paho.Client, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
+        if self._over.is_set() or self._connected_at is None:
+            return
+        self._counted["disconnects"] += 1
+        self._lost_at = time.time()
+        self._quick = self._quick + 1 if time.monotonic() - self._connected_at < QUICK_S else 0
+        self._connected_at = None
+        log.warning("mqtt: %s:%d: connection lost: %s", self._address.host, self._address.port, reason)
+        if self._quick == QUICK_TIMES:
+            log.error(
+                "mqtt: the connection is lost each time soon after it was made: does another client have the id %s? "
+                "Give each its own mqtt.client_id",
+                self._id,
+            )
+
+    def _on_message(self, client: paho.Client, _data: Any, message: paho.MQTTMessage) -> None:
+        """Take a message, waiting for room, and acknowledge it; at the end of the service the broker keeps it."""
+        if self._over.is_set():
+            return
+        try:
+            topic = message.topic
+        except UnicodeDecodeError:
+            self._counted["bad_topic"] += 1
+        else:
+            digest = hashlib.blake2b(topic.encode() + b"\0" + message.payload, digest_size=16).digest()
+            if message.dup and digest in self._recent:  # taken before, but its acknowledgement was lost
+                self._counted["messages_repeated"] += 1
+            elif not self._taken(topic, message.payload):
+                return
+            self._remember(digest)
+        client.ack(message.mid, message.qos)
+
+    def _taken(self, topic: str, payload: bytes) -> bool:
+        """Offer a message until there is room for it; False when the service ends before."""
+        told = False
+        while True:
+            try:
+                take(topic, payload, self._topic, self._service.nodes, self._submit, self._counted)
+            except Refused as error:
+                if not told:
+                    note("refused", topic, f"{error}; it is offered again", self._counted)
+                told = True
+                if self._over.wait(RETRY_S):
+                    return False
+            else:
+                return True
+
+    def _remember(self, digest: bytes) -> None:
+        self._recent[digest] = None
+        self._recent.move_to_end(digest)
+        if len(self._recent) > RECENT:
+            self._recent.popitem(last=False)
+
+    def _submit(self, events: NodeEvents) -> Submitted:
+        """Give events to the service; those that are old because the broker kept them are only stored."""
+        if self._away is None:
+            return self._service.submit_node_events(events)
+        old = events.time < time.time() - self._late_s
+        old &= (events.time >= self._away.since - self._late_s) & (events.time <= self._away.until)
+        if not old.any():
+            return self._service.submit_node_events(events)
+        try:
+            submitted = self._service.submit_node_events(events[~old]) if not old.all() else Submitted(0)
+        except RefusedTime as error:
+            submitted = Submitted(0, error.rows)
+        self._service.keep_node_events(events[old])
+        self._counted["events_late"] += int(old.sum())
+        return Submitted(submitted.taken + int(old.sum()), submitted.refused)
 
 
 class Address:
@@ -157,32 +290,34 @@ def node_of_topic(topic: str, pattern: str) -> str | None:
     return found[levels.index("+")]
 
 
-def _take(
-    topic: str, payload: object, pattern: str, nodes: Sequence[NodeSite], submit: Submit, counted: Counter[str]
+def take(
+    topic: str, payload: bytes, pattern: str, nodes: Sequence[NodeSite], submit: Submit, counted: Counter[str]
 ) -> None:
-    body = payload if isinstance(payload, bytes) else str(payload).encode()
-    counted["messages"] += 1
+    """Take the events of a message; what is wrong is counted by reason.
+
+    Raises Refused when there is no room now; nothing is counted then.
+    """
     try:
-        if len(body) > MESSAGE_BYTES:
-            raise BadMessage("too_many", f"{len(body)} octets in one message; at most {MESSAGE_BYTES} are taken")
-        parsed = parse_node_events(body, nodes, MESSAGE_LIMIT, node=node_of_topic(topic, pattern))
-        for bad in parsed.bad:
-            _note(bad.reason, topic, bad.message, counted)
+        if len(payload) > MESSAGE_BYTES:
+            raise BadMessage("too_many", f"{len(payload)} octets in one message; at most {MESSAGE_BYTES} are taken")
+        parsed = parse_node_events(payload, nodes, MESSAGE_LIMIT, node=node_of_topic(topic, pattern))
         submitted = submit(parsed.rows)
     except BadMessage as error:
-        for bad in error.rows or [RefusedRow(0, error.reason, str(error))]:
-            _note(bad.reason, topic, bad.message, counted)
+        wrong = list(error.rows) or [RefusedRow(0, error.reason, str(error))]
     except RefusedTime as error:
+        wrong = [*parsed.bad, RefusedRow(0, "refused_time", str(error))]
         counted["events_refused"] += len(error.rows)
-        _note("refused_time", topic, str(error), counted)
-    except Refused as error:
-        _note("refused", topic, str(error), counted)
     else:
+        wrong = list(parsed.bad)
         counted["events"] += submitted.taken
         counted["events_refused"] += len(submitted.refused)
+    counted["messages"] += 1
+    for bad in wrong:
+        note(bad.reason, topic, bad.message, counted)
 
 
-def _note(reason: str, topic: str, why: str, counted: Counter[str]) -> None:
+def note(reason: str, topic: str, why: str, counted: Counter[str]) -> None:
+    """Count something that is not taken; the first of each reason is told in the log."""
     counted[reason] += 1
     if counted[reason] == 1:
         log.warning("mqtt: %s: %s (further ones of this kind are only counted)", topic, why)
