@@ -56,6 +56,7 @@ def create_app(service: Service, *, hub: Hub, store: Store | None, view3d_router
             yield
         finally:
             await hub.stop()
+            context.reads.close()
 
     app = FastAPI(
         title="Airside",
@@ -103,7 +104,7 @@ def _operation_router(service: Service) -> APIRouter:
         return answer({"status": "ok", "checks": {}})
 
     @router.get("/ready", response_model=models.Health, responses={503: {"model": models.Health}})
-    def ready() -> Response:
+    async def ready() -> Response:
         """200 after migrations, warm-up and the first picture; 503 with the checks before."""
         readiness = service.readiness()
         body = {"status": "ok" if readiness.ready else "starting", "checks": readiness.checks}

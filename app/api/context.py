@@ -7,8 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from http import HTTPStatus
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
+from anyio import CapacityLimiter, to_thread
 from fastapi import Depends, Query
 from pydantic import BeforeValidator, WithJsonSchema
 from starlette.responses import Response
@@ -19,10 +20,20 @@ from app.api.problems import PROBLEM, ApiProblem
 from app.contract import Refused, Service
 from app.live.hub import Hub
 from app.settings import Settings
+from app.store.read_pool import ReadPool
 from app.wire import Row, Wire, encode
 
 if TYPE_CHECKING:
     from app.store.store import Store
+
+
+Made = TypeVar("Made")
+
+INTAKE_THREADS = 16
+"""Requests with measurements that are read at once; more would only take the processor from one another."""
+
+ORDER_THREADS = 8
+"""Orders of operators that are carried out at once: several times what the operators of one airport give."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +41,8 @@ class Context:
     """The service and what stands around it. store: None when nothing is kept.
 
     refused: how many requests and connections the web server refused or cut, by reason.
+    reads: where the store is asked. intake, orders: what measurements and operators' orders wait for is theirs alone,
+    so that no other request, however slow, keeps them waiting.
     """
 
     service: Service
@@ -38,6 +51,17 @@ class Context:
     settings: Settings
     wire: Wire
     refused: Counter[str] = field(default_factory=Counter)
+    reads: ReadPool = field(default_factory=ReadPool)
+    intake: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(INTAKE_THREADS))
+    orders: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(ORDER_THREADS))
+
+    async def take_in(self, work: Callable[[], Made]) -> Made:
+        """Do work on measurements in a thread."""
+        return await to_thread.run_sync(work, limiter=self.intake)
+
+    async def order(self, work: Callable[[], Made]) -> Made:
+        """Carry out an operator's order in a thread."""
+        return await to_thread.run_sync(work, limiter=self.orders)
 
     def stamp(self) -> Row:
         """epoch, seq, time and mode of the newest picture. Raises ApiProblem before the first."""

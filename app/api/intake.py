@@ -8,7 +8,6 @@ from functools import partial
 from typing import Annotated, Any, Literal, TypeVar
 
 from fastapi import APIRouter, Path
-from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import Response
 
@@ -47,7 +46,7 @@ def intake_router(context: Context) -> APIRouter:
     )
     async def sweeps(id: Annotated[str, Path(max_length=32)], request: Request) -> Response:
         body = await _body(request, OCTETS)
-        counted = await run_in_threadpool(context.ask, lambda: service.submit_sweeps(id, body), 422)
+        counted = await context.take_in(lambda: context.ask(lambda: service.submit_sweeps(id, body), 422))
         return answer(counted)
 
     @router.post(
@@ -65,7 +64,7 @@ def intake_router(context: Context) -> APIRouter:
         """
         body = await _body(request, JSON)
         read = partial(parse_node_events, body, service.nodes, limits.node_events_per_request)
-        return answer(await run_in_threadpool(_take, context, "nodes", read, service.submit_node_events))
+        return answer(await context.take_in(lambda: _take(context, "nodes", read, service.submit_node_events)))
 
     @router.post(
         "/targets/reports",
@@ -86,7 +85,7 @@ def intake_router(context: Context) -> APIRouter:
         """
         body = await _body(request, JSON)
         read = partial(parse_target_reports, body, service.airport.frame, limits.node_events_per_request)
-        return answer(await run_in_threadpool(_take, context, "reports", read, service.submit_target_reports))
+        return answer(await context.take_in(lambda: _take(context, "reports", read, service.submit_target_reports)))
 
     return router
 

@@ -14,6 +14,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from app.contract import Refused, UnknownId
+from app.store.read_pool import NoAnswer
 from app.wire import encode
 
 log = logging.getLogger(__name__)
@@ -77,6 +78,11 @@ def install(app: FastAPI) -> None:
     async def database(_request: Request, error: SQLAlchemyError) -> Response:
         log.error("the database does not answer", exc_info=error)
         return problem(503, "the database does not answer", headers={"Retry-After": "5"})
+
+    @app.exception_handler(NoAnswer)
+    async def unanswered(_request: Request, error: NoAnswer) -> Response:
+        log.warning("%s", error)
+        return problem(503, str(error), headers={"Retry-After": str(error.retry_after_s)})
 
     @app.exception_handler(Exception)
     async def unforeseen(_request: Request, error: Exception) -> Response:

@@ -14,6 +14,7 @@ from app.api import models
 from app.api.context import Context, Span, answer, problems
 from app.api.openapi import reference
 from app.api.problems import ApiProblem
+from app.store.read_pool import RETRY_LATE_S, NoAnswer
 from app.wire import Row, encode
 
 log = logging.getLogger(__name__)
@@ -109,24 +110,31 @@ def _history_routes(router: APIRouter, context: Context) -> None:
     @router.get(
         "/tracks/{id}/history", response_model=models.History, responses=problems(404, 422, 503), tags=["tracks"]
     )
-    def history(id: TrackId, span: Span, limit: Limit = 3600) -> Response:
+    async def history(id: TrackId, span: Span, limit: Limit = 3600) -> Response:
         """The stored points of the newest track with this id (or the newest within the given times)."""
         if store is None:
             raise ApiProblem(404, "nothing is stored")
-        found = store.track_history(id, *span, limit)
-        if found is None:
-            raise ApiProblem(404, f"no track with the id {id} is stored")
-        return answer({"mode": mode, **found})
+
+        def found() -> Response:
+            row = store.track_history(id, *span, limit)
+            if row is None:
+                raise ApiProblem(404, f"no track with the id {id} is stored")
+            return answer({"mode": mode, **row})
+
+        return await context.reads.ask(found)
 
     @router.get("/history/tracks", response_model=models.StoredTrackList, responses=problems(422, 503), tags=["tracks"])
-    def stored_tracks(
+    async def stored_tracks(
         span: Span,
         callsign: Annotated[str | None, Query(max_length=8)] = None,
         limit: Limit = 200,
     ) -> Response:
         """Stored tracks, newest first."""
-        rows = store.tracks(*span, callsign=callsign, limit=limit) if store is not None else []
-        return answer({"mode": mode, "tracks": rows})
+        if store is None:
+            return answer({"mode": mode, "tracks": []})
+        return await context.reads.ask(
+            lambda: answer({"mode": mode, "tracks": store.tracks(*span, callsign=callsign, limit=limit)})
+        )
 
 
 def _alert_routes(router: APIRouter, context: Context) -> None:
@@ -139,7 +147,7 @@ def _alert_routes(router: APIRouter, context: Context) -> None:
         return {id: context.wire.alert(one) for id, one in {**context.hub.recent.copy(), **live}.items()}
 
     @router.get("/alerts", response_model=models.AlertList, responses=problems(422), tags=["alerts"])
-    def alerts(
+    async def alerts(
         span: Span,
         state: Annotated[Literal["live", "new", "ongoing", "acknowledged", "cleared"] | None, Query()] = None,
         limit: Limit = 200,
@@ -148,29 +156,41 @@ def _alert_routes(router: APIRouter, context: Context) -> None:
 
         While the database does not answer, those of this run that are still in memory; `complete` is false then.
         """
-        stored, complete = _unless_down(lambda: store.alerts(state, *span, limit) if store is not None else [])
-        merged = {one["id"]: one for one in stored}
-        for id, row in in_memory().items():
-            merged.pop(id, None)
-            live = state == "live" and row["state"] != "cleared"
-            if (state is None or live or state == row["state"]) and _within(row["raised_at"], *span):
-                merged[id] = row
-        rows = sorted(merged.values(), key=lambda row: (row["raised_at"], row["id"]), reverse=True)
-        return answer({"mode": mode, "alerts": rows[:limit], "complete": complete})
+
+        def told(stored: list[Row], complete: bool) -> Response:
+            merged = {one["id"]: one for one in stored}
+            for id, row in in_memory().items():
+                merged.pop(id, None)
+                live = state == "live" and row["state"] != "cleared"
+                if (state is None or live or state == row["state"]) and _within(row["raised_at"], *span):
+                    merged[id] = row
+            rows = sorted(merged.values(), key=lambda row: (row["raised_at"], row["id"]), reverse=True)
+            return answer({"mode": mode, "alerts": rows[:limit], "complete": complete})
+
+        if store is None:
+            return told([], True)
+        return await _unless_down(
+            context, lambda: told(store.alerts(state, *span, limit), True), lambda: told([], False)
+        )
 
     @router.get("/alerts/{id}", response_model=models.AlertLife, responses=problems(404, 422, 503), tags=["alerts"])
-    def alert(id: AlertId) -> Response:
+    async def alert(id: AlertId) -> Response:
         """One alert with every stored step of its life.
 
         While the database does not answer, without these steps, if it is still in memory; `complete` is false then.
         """
-        changes, complete = _unless_down(lambda: store.alert_changes(id) if store is not None else [])
-        row = in_memory().get(id) or (changes[-1]["alert"] if changes else None)
-        if row is None and not complete:
-            raise ApiProblem(503, "the database does not answer", headers={"Retry-After": "5"})
-        if row is None:
-            raise ApiProblem(404, f"there is no alert {id}")
-        return answer({"mode": mode, "alert": row, "changes": changes, "complete": complete})
+
+        def told(changes: list[Row], complete: bool) -> Response:
+            row = in_memory().get(id) or (changes[-1]["alert"] if changes else None)
+            if row is None and not complete:
+                raise ApiProblem(503, "the database does not answer", headers={"Retry-After": str(RETRY_LATE_S)})
+            if row is None:
+                raise ApiProblem(404, f"there is no alert {id}")
+            return answer({"mode": mode, "alert": row, "changes": changes, "complete": complete})
+
+        if store is None:
+            return told([], True)
+        return await _unless_down(context, lambda: told(store.alert_changes(id), True), lambda: told([], False))
 
     @router.post(
         "/alerts/{id}/acknowledge",
@@ -178,9 +198,9 @@ def _alert_routes(router: APIRouter, context: Context) -> None:
         responses=problems(400, 403, 404, 409, 413, 422, 503),
         tags=["alerts"],
     )
-    def acknowledge(id: AlertId, who: models.Acknowledgement) -> Response:
+    async def acknowledge(id: AlertId, who: models.Acknowledgement) -> Response:
         """Acknowledge a live alert: it stays in the picture until it clears, but no longer calls."""
-        made = context.ask(lambda: service.acknowledge(id, who.by))
+        made = await context.order(lambda: context.ask(lambda: service.acknowledge(id, who.by)))
         return answer({"mode": mode, "alert": context.wire.alert(made)})
 
 
@@ -188,7 +208,7 @@ def _runway_routes(router: APIRouter, context: Context) -> None:
     service, mode = context.service, context.settings.mode
 
     @router.get("/runways", response_model=models.RunwayList, tags=["runways"])
-    def runways() -> Response:
+    async def runways() -> Response:
         """How each runway is used, and what is on it."""
         picture = service.picture()
         rows = [context.wire.runway(one) for one in picture.runways] if picture is not None else []
@@ -200,25 +220,27 @@ def _runway_routes(router: APIRouter, context: Context) -> None:
         responses=problems(400, 403, 404, 409, 413, 422, 503),
         tags=["runways"],
     )
-    def set_runway(
+    async def set_runway(
         id: Annotated[str, Path(max_length=32, description='"06/24", also written "06-24"')], order: models.RunwayOrder
     ) -> Response:
         """Open or close a runway, put a direction into use, set low visibility."""
         known = {one.id for one in service.airport.runways}
         name = id if id in known else id.replace("-", "/")
-        made = context.ask(
-            lambda: service.set_runway(name, open=order.open, in_use=order.in_use, visibility=order.visibility)
+        made = await context.order(
+            lambda: context.ask(
+                lambda: service.set_runway(name, open=order.open, in_use=order.in_use, visibility=order.visibility)
+            )
         )
         return answer({"mode": mode, "runway": context.wire.runway(made)})
 
 
-def _unless_down(ask: Callable[[], list[Row]]) -> tuple[list[Row], bool]:
-    """What the database says and True; nothing and False while it does not answer."""
+async def _unless_down(context: Context, ask: Callable[[], Response], instead: Callable[[], Response]) -> Response:
+    """What the database says; what is told `instead` while it does not answer."""
     try:
-        return ask(), True
-    except SQLAlchemyError as error:
+        return await context.reads.ask(ask)
+    except (SQLAlchemyError, NoAnswer) as error:
         log.warning("the database does not answer; told from memory: %s", type(error).__name__)
-        return [], False
+    return instead()
 
 
 def _within(time: float, first: float | None, last: float | None) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,31 +16,48 @@ from app.settings import ROOT, SettingsError
 
 MIGRATIONS = ROOT / "migrations"
 BUSY_MS = 10_000
-PATIENCE = {"connect_timeout": 3, "tcp_user_timeout": 5_000}
-"""Seconds for a connection to PostgreSQL, and ms for what was sent to be acknowledged: a host that is gone gives no
-answer at all, and who asks is to be told so."""
+PATIENCE = {
+    "connect_timeout": 3,
+    "tcp_user_timeout": 5_000,
+    "keepalives_idle": 5,
+    "keepalives_interval": 2,
+    "keepalives_count": 3,
+}
+"""Seconds for a connection to PostgreSQL, ms for what was sent to be acknowledged, and seconds (and probes) after which
+a silent connection is tried out: a host that is gone gives no answer at all, and who asks is to be told so."""
+
+READ_MS = 4_000
+"""A question is ended by the database itself after this long (PostgreSQL), or waits no longer for a lock (SQLite):
+before `read_pool.ANSWER_S`, so that its thread is free again for the next."""
+
+READ_POOL = {"pool_size": 4, "pool_timeout": READ_MS / 1000}
+"""Connections for questions: one for each thread that asks (`read_pool.THREADS`)."""
 
 
-def open_engine(url: str) -> Engine:
+def open_engine(url: str, *, reading: bool = False) -> Engine:
     """An engine for SQLite (WAL, waits for locks) or PostgreSQL. Makes the folder of a SQLite file.
 
-    Raises SettingsError when the URL cannot be read or no such database is known.
+    reading: for questions alone, none of which may take longer than READ_MS. Raises SettingsError when the URL cannot
+    be read or no such database is known.
     """
     parsed = _read(url)
     if parsed.drivername in ("postgresql", "postgres"):
         parsed = parsed.set(drivername="postgresql+psycopg")
     if parsed.get_backend_name() != "sqlite":
         try:
-            return create_engine(parsed, pool_pre_ping=True, connect_args=PATIENCE)
+            engine = create_engine(parsed, pool_pre_ping=True, connect_args=PATIENCE, **(READ_POOL if reading else {}))
         except (ArgumentError, ImportError):
             raise SettingsError(f"database_url: {parsed.drivername} is no known kind of database") from None
+        if reading:
+            event.listen(engine, "connect", _limit_questions)
+        return engine
     if parsed.database and parsed.database != ":memory:":
         file = Path(parsed.database)
         file.parent.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
         if not parsed.database.startswith("file:"):
             make_private_file(file)  # the files of the write-ahead log take its mode
-    engine = create_engine(parsed)
-    event.listen(engine, "connect", _prepare_sqlite)
+    engine = create_engine(parsed, **(READ_POOL if reading else {}))
+    event.listen(engine, "connect", partial(_prepare_sqlite, busy_ms=READ_MS if reading else BUSY_MS))
     return engine
 
 
@@ -53,9 +71,16 @@ def _read(url: str) -> URL:
         ) from None
 
 
-def _prepare_sqlite(connection: sqlite3.Connection, _record: Any) -> None:
+def _limit_questions(connection: Any, _record: Any) -> None:
+    with connection.cursor() as cursor:
+        cursor.execute(f"SET statement_timeout = {READ_MS}")
+        cursor.execute("SET default_transaction_read_only = on")
+    connection.commit()
+
+
+def _prepare_sqlite(connection: sqlite3.Connection, _record: Any, busy_ms: int) -> None:
     cursor = connection.cursor()
-    cursor.execute(f"PRAGMA busy_timeout = {BUSY_MS}")
+    cursor.execute(f"PRAGMA busy_timeout = {busy_ms}")
     cursor.execute("PRAGMA journal_mode = WAL")
     cursor.execute("PRAGMA synchronous = FULL")
     cursor.close()

@@ -36,11 +36,12 @@ class Store:
         self.wire = Wire(airport, settings.mode)
         self.airport = airport.icao[:16]
         self.engine = open_engine(url)
+        self.reading = open_engine(url, reading=True)
         self._queue = Queue(settings.limits.rows_queued)
         self._retention = Retention(settings.storage.retention_days, self.airport)
         self._nodes = tuple(one.id for one in settings.nodes)
         self._writer = Writer(self.engine, self._queue, self.wire, self._nodes, self._retention)
-        self._reader = Reader(self.engine, self.wire)
+        self._reader = Reader(self.reading, self.wire)
         self._due = _Due(settings.storage.point_interval_s)
         self._sensors: dict[str, tuple[str, str, float]] = {}
         self._failed = 0
@@ -54,6 +55,7 @@ class Store:
         """Write what waits, end the writer, close the connections."""
         self._writer.stop()
         self.engine.dispose()
+        self.reading.dispose()
 
     def record(self, picture: Picture, changes: tuple[AlertChange, ...]) -> None:
         """Take a picture (a `PictureListener`): returns at once, never raises."""

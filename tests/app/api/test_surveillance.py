@@ -95,6 +95,7 @@ def test_a_real_database_that_is_gone(tmp_path: Path) -> None:
         until(lambda: told(server)["alerts"], "the alert is told")
         assert server.store is not None
         server.store.engine.dispose()
+        server.store.reading.dispose()
         for path in tmp_path.glob("airside.sqlite3*"):
             path.unlink()
         (tmp_path / "airside.sqlite3").mkdir()

@@ -21,7 +21,7 @@ from sqlalchemy import create_engine, select, text
 from sqlalchemy.exc import OperationalError
 
 from app.settings import LimitsSettings, NodeSettings, StorageSettings
-from app.store import schema
+from app.store import database, schema
 from app.store.batch import Queue
 from app.store.database import migrate, open_engine
 from app.store.store import Store, _Due
@@ -202,8 +202,8 @@ def test_alerts_of_earlier_versions_get_their_worst_stage_from_their_steps(url: 
                 )
             connection.execute(
                 text(
-                    "INSERT INTO alerts (airport, id, mode, rule, stage, state, raised_at, updated_at, simulated, document)"
-                    " VALUES (:airport, :id, 'live', 'hold_entry', :stage, 'cleared', :at, :at, true, :document)"
+                    "INSERT INTO alerts (airport, id, mode, rule, stage, state, raised_at, updated_at, simulated, "
+                    "document) VALUES (:airport, :id, 'live', 'a', :stage, 'cleared', :at, :at, true, :document)"
                 ),
                 {"airport": airport, "id": id, "stage": stage, "at": T0, "document": document},
             )
@@ -415,6 +415,26 @@ def test_what_the_database_refuses_does_not_take_the_rest_with_it(sqlite_url: st
         until(lambda: store.writer_counters()["refused"] == 1, "the refused one is counted")
         until(lambda: store.writer_counters()["points"] == 12, "the rest is written")
         until(lambda: [one["id"] for one in store.alerts(None, None, None)] == [3, 1], "the refused one waits no more")
+
+
+def test_a_question_waits_for_the_database_only_so_long(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(database, "READ_MS", 100)
+    migrate(url)
+    writing, reading = open_engine(url), open_engine(url, reading=True)
+    try:
+        with writing.connect() as writer, reading.connect() as reader:
+            if url.startswith("sqlite"):
+                writer.execute(text("PRAGMA locking_mode = EXCLUSIVE"))
+                reader.execute(text("SELECT 1"))
+                question = "BEGIN IMMEDIATE"
+                writer.execute(text("DELETE FROM tracks"))
+            else:
+                question = "SELECT pg_sleep(60)"
+            with pytest.raises(OperationalError, match=r"locked|statement timeout"):
+                reader.execute(text(question))
+    finally:
+        writing.dispose()
+        reading.dispose()
 
 
 def test_recording_does_not_fail_with_the_writer_gone(sqlite_url: str) -> None:
