@@ -6,7 +6,9 @@ import logging
 import os
 import stat
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import BinaryIO
 
 from app.settings import SettingsError
 
@@ -47,3 +49,24 @@ def make_private_file(path: Path) -> None:
     os.close(os.open(path, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, FILE_MODE))
     if path.stat().st_uid == os.geteuid():
         path.chmod(FILE_MODE)
+
+
+def write_private_file(path: Path, write: Callable[[BinaryIO], None]) -> None:
+    """Put what `write` writes into a file in one step: a crash leaves the old one whole. Raises OSError."""
+    path.parent.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
+    beside = path.with_name(f".{path.name}.new")
+    try:
+        make_private_file(beside)
+        with beside.open("wb") as file:
+            write(file)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(beside, path)
+    except BaseException:
+        beside.unlink(missing_ok=True)  # on a full disk the half of it takes the room of the next
+        raise
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)

@@ -15,10 +15,11 @@ from app.airports import load_airport
 from app.api.application import create_app
 from app.bus import connect_bus
 from app.contract import ReplayControl, Service
-from app.ingest.mqtt import MqttThread
+from app.ingest.mqtt import MqttThread, client_id
 from app.live.hub import Hub
 from app.logs import log_to
 from app.private_files import make_private_folder
+from app.runtime.restart import RestartNote
 from app.service import SurfaceService
 from app.settings import Settings, SettingsError
 from app.startup import Served, Starter, say
@@ -59,6 +60,10 @@ class Running:
         step("database: bringing the schema up to date")
         store.start()
         self._ends.callback(store.stop)
+        restart = RestartNote(store.alerts("live", None, None))
+        if restart.words:
+            log.warning("%s", restart.words)
+        service.extra_sensors.append(restart.state)
         store.close_open_alerts("restart", time.time())
         service.checks["database"] = True
         step("kernels: compiling or loading from the cache")
@@ -81,7 +86,8 @@ class Running:
         service.start()
         self._ends.callback(service.stop)
         if self.settings.mqtt.url is not None and self.settings.mqtt.url.get_secret_value():
-            mqtt = MqttThread(self.settings.mqtt, service)
+            late_s = self.settings.clocks.nodes.max_offset_s
+            mqtt = MqttThread(self.settings.mqtt, service, client_id(self.settings, service.airport.icao), late_s)
             mqtt.start()
             service.extra_counters["mqtt"] = mqtt.counters
             self._ends.callback(mqtt.stop)

@@ -41,6 +41,7 @@ from app.runtime.feeds import Feed
 from app.runtime.front_end import FrontEndSwitch
 from app.runtime.host_clock import HostClock
 from app.runtime.radar_worker import RadarWorker
+from app.runtime.runway_memory import RunwayMemory
 from app.runtime.state_keeper import StateKeeper
 from app.runtime.surface_worker import SurfaceWorker
 from app.settings import Settings
@@ -76,7 +77,7 @@ class SurfaceService:
         self.replay: ReplayControl | None = None
         self.checks = {"database": False, "warm": False, "picture": False}
         self.extra_counters: dict[str, Callable[[], dict[str, int]]] = {}
-        self.extra_sensors: list[Callable[[], SensorState]] = []
+        self.extra_sensors: list[Callable[[], SensorState | None]] = []
         self.keep_node_events: Callable[[NodeEvents], None] = lambda events: None
         self._workers: dict[str, RadarWorker] = {}
         self._switches: dict[str, FrontEndSwitch] = {}
@@ -87,6 +88,8 @@ class SurfaceService:
             settings.storage.state_interval_s,
             settings.storage.state_max_age_s,
         )
+        self._runways = RunwayMemory(settings.data_dir / "state", airport.icao, settings.mode)
+        self._runway_orders = threading.Lock()
         self._receivers: dict[str, VideoReceiver] = {}
         self._surface: SurfaceWorker | None = None
         self._journal: JournalRecorder | None = None
@@ -106,12 +109,14 @@ class SurfaceService:
     def prepare(self, first_alert: int = 1, resume: bool = True) -> None:
         """Build the chains and the engine and compile every kernel. Raises SettingsError.
 
-        resume: the detectors take up what they had learned before a restart.
+        resume: the detectors take up what they had learned before a restart, and the runways how they were set.
         """
         engine = surface_engine(
             self.settings, self.airport, self.radars, self.nodes, first_alert=first_alert, clock=time.perf_counter
         )
         engine.tracker.warm()
+        if resume:
+            self._runways.take_up([one.id for one in self.airport.runways], engine.monitor.set_runway)
         if self.settings.journal.folder is not None:
             self._journal = JournalRecorder(self.settings, self.airport_geojson, self.settings.journal)
             self.extra_sensors.append(self._journal.state)
@@ -147,7 +152,7 @@ class SurfaceService:
     def start(self) -> None:
         """Open the sockets and start the threads. Raises OSError when a port is taken."""
         surface = self._running
-        surface.listen(self._first_picture)
+        surface.listen(self._look_at_picture)
         surface.start()
         for worker in self._workers.values():
             worker.start()
@@ -198,7 +203,9 @@ class SurfaceService:
         others = [self._nodes.state()] if self.nodes else []
         if self._reports.ever_tried:
             others.append(self._reports.state())
-        return (*radars, *others, self._surface_state(), *(one() for one in self.extra_sensors))
+        others.append(self._surface_state())
+        more = (one() for one in (self._runways.state, *self.extra_sensors))
+        return (*radars, *others, *(one for one in more if one is not None))
 
     def video(self, radar: str) -> Video:
         """The newest turn of a radar."""
@@ -225,8 +232,14 @@ class SurfaceService:
     def set_runway(
         self, runway: str, *, open: bool | None, in_use: str | None, visibility: Visibility | None
     ) -> RunwayState:
-        """Set how a runway is used."""
-        state: RunwayState = self._carried_out(SetRunway(runway, open, in_use, visibility), runway)
+        """Set how a runway is used; it is so after a restart, too."""
+        with self._runway_orders:
+            try:
+                state: RunwayState = self._carried_out(SetRunway(runway, open, in_use, visibility), runway)
+            except Refused:
+                self._runways.in_doubt = True
+                raise
+            self._runways.note([state])
         return state
 
     def _video_recorder(self) -> Callable[[RadarChain, Sweeps], None]:
@@ -310,8 +323,9 @@ class SurfaceService:
             return (*silent, "reports")
         return silent
 
-    def _first_picture(self, picture: Picture, _changes: tuple[AlertChange, ...]) -> None:
+    def _look_at_picture(self, picture: Picture, _changes: tuple[AlertChange, ...]) -> None:
         self.checks["picture"] = True
+        self._runways.note_changed(picture.runways)
 
     def _expect(self, picture: Picture) -> None:
         """Tell every radar how the tracks that move point, for the bearings of its next plots."""

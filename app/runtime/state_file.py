@@ -5,7 +5,6 @@ The file is a `.npz` without pickled objects. It is read only as far as its own 
 
 from __future__ import annotations
 
-import os
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from app.private_files import FOLDER_MODE, make_private_file
+from app.private_files import write_private_file
 from pipeline.state import StateError
 
 SAVED_AT = "file.saved_at"
@@ -24,24 +23,8 @@ MOST_ARRAYS = 256
 
 def write_state(path: Path, arrays: Mapping[str, NDArray[Any]], saved_at: float, scene: str) -> None:
     """Put the arrays into the file in one step. saved_at: UTC s. scene: what else they belong to. Raises OSError."""
-    path.parent.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.name}.new")
     kept = {**arrays, SAVED_AT: np.array(saved_at), SCENE: np.array(scene)}
-    try:
-        make_private_file(beside)
-        with beside.open("wb") as file:
-            np.savez(file, allow_pickle=False, **kept)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(beside, path)
-    except BaseException:
-        beside.unlink(missing_ok=True)  # on a full disk the half of it takes the room of the next
-        raise
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
+    write_private_file(path, lambda file: np.savez(file, allow_pickle=False, **kept))
 
 
 def read_state(path: Path, now: float, max_age_s: float, scene: str, most_bytes: int) -> dict[str, NDArray[Any]]:
