@@ -32,6 +32,7 @@ def surveillance_router(context: Context) -> APIRouter:
     _track_routes(router, context)
     _history_routes(router, context)
     _alert_routes(router, context)
+    _acknowledge_route(router, context)
     _runway_routes(router, context)
     return router
 
@@ -114,9 +115,10 @@ def _history_routes(router: APIRouter, context: Context) -> None:
         """The stored points of the newest track with this id (or the newest within the given times)."""
         if store is None:
             raise ApiProblem(404, "nothing is stored")
+        asked = store
 
         def found() -> Response:
-            row = store.track_history(id, *span, limit)
+            row = asked.track_history(id, *span, limit)
             if row is None:
                 raise ApiProblem(404, f"no track with the id {id} is stored")
             return answer({"mode": mode, **row})
@@ -132,8 +134,9 @@ def _history_routes(router: APIRouter, context: Context) -> None:
         """Stored tracks, newest first."""
         if store is None:
             return answer({"mode": mode, "tracks": []})
+        asked = store
         return await context.reads.ask(
-            lambda: answer({"mode": mode, "tracks": store.tracks(*span, callsign=callsign, limit=limit)})
+            lambda: answer({"mode": mode, "tracks": asked.tracks(*span, callsign=callsign, limit=limit)})
         )
 
 
@@ -169,8 +172,9 @@ def _alert_routes(router: APIRouter, context: Context) -> None:
 
         if store is None:
             return told([], True)
+        asked = store
         return await _unless_down(
-            context, lambda: told(store.alerts(state, *span, limit), True), lambda: told([], False)
+            context, lambda: told(asked.alerts(state, *span, limit), True), lambda: told([], False)
         )
 
     @router.get("/alerts/{id}", response_model=models.AlertLife, responses=problems(404, 422, 503), tags=["alerts"])
@@ -190,7 +194,12 @@ def _alert_routes(router: APIRouter, context: Context) -> None:
 
         if store is None:
             return told([], True)
-        return await _unless_down(context, lambda: told(store.alert_changes(id), True), lambda: told([], False))
+        asked = store
+        return await _unless_down(context, lambda: told(asked.alert_changes(id), True), lambda: told([], False))
+
+
+def _acknowledge_route(router: APIRouter, context: Context) -> None:
+    service, mode = context.service, context.settings.mode
 
     @router.post(
         "/alerts/{id}/acknowledge",

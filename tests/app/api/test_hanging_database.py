@@ -17,6 +17,9 @@ from tests.support.running import Server, running, until
 CALLS = 60
 """More than the server has threads for."""
 
+LIMITS = httpx.Limits(max_connections=CALLS + 10, max_keepalive_connections=0)
+"""Each request has a connection of its own: the server closes those that are idle for 5 s."""
+
 
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[Server]:
@@ -72,8 +75,7 @@ async def works(http: httpx.AsyncClient, server: Server) -> None:
 async def test_history_that_hangs_is_refused_and_all_else_is_answered(
     path: str, server: Server, hanging: Hanging
 ) -> None:
-    limits = httpx.Limits(max_connections=CALLS + 10)
-    async with httpx.AsyncClient(base_url=server.url, timeout=60.0, limits=limits) as http:
+    async with httpx.AsyncClient(base_url=server.url, timeout=60.0, limits=LIMITS) as http:
         calls = [asyncio.create_task(http.get(path)) for _ in range(CALLS)]
         await asyncio.to_thread(hanging.begun.acquire)
         await works(http, server)
@@ -94,8 +96,7 @@ async def test_history_that_hangs_is_refused_and_all_else_is_answered(
 async def test_requests_that_fill_the_servers_threads_keep_nobody_else_waiting(
     server: Server, hanging: Hanging
 ) -> None:
-    limits = httpx.Limits(max_connections=CALLS + 10)
-    async with httpx.AsyncClient(base_url=server.url, timeout=60.0, limits=limits) as http:
+    async with httpx.AsyncClient(base_url=server.url, timeout=60.0, limits=LIMITS) as http:
         calls = [asyncio.create_task(http.get("/api/v1/radars/smr-1/parts")) for _ in range(CALLS)]
         for _ in range(40):
             await asyncio.to_thread(hanging.begun.acquire)

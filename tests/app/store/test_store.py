@@ -423,13 +423,10 @@ def test_a_question_waits_for_the_database_only_so_long(url: str, monkeypatch: p
     writing, reading = open_engine(url), open_engine(url, reading=True)
     try:
         with writing.connect() as writer, reading.connect() as reader:
+            question = "SELECT pg_sleep(60)"
             if url.startswith("sqlite"):
-                writer.execute(text("PRAGMA locking_mode = EXCLUSIVE"))
-                reader.execute(text("SELECT 1"))
-                question = "BEGIN IMMEDIATE"
-                writer.execute(text("DELETE FROM tracks"))
-            else:
-                question = "SELECT pg_sleep(60)"
+                question = "DELETE FROM tracks"
+                writer.execute(text(question))
             with pytest.raises(OperationalError, match=r"locked|statement timeout"):
                 reader.execute(text(question))
     finally:
