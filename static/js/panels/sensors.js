@@ -8,6 +8,9 @@ import { byId, el, keyed, setText } from './dom.js';
 /** @type {Record<string, string>} what the top bar says of states that operators had set and a restart took away */
 const RESET = { runways: 'RUNWAY STATE – CHECK', restart: 'ALERTS RESET BY RESTART' };
 
+/** @param {SensorState} sensor @returns {string} what of an operator's is to be looked at, '' when nothing */
+export const resetOf = (sensor) => (sensor.kind === 'store' && RESET[sensor.id]) || '';
+
 /** Words in the name of a counter that mean loss or trouble; everything else is how much was done. */
 const TROUBLE = new Set(('lost late duplicate reordered dropped wrong malformed truncated oversized refused failed failures missing degraded '
   + 'no silent ahead behind rebased steps overflow errors incomplete backwards jump step restart sequence compressed undelivered skipped implausible retries held').split(' '));
@@ -48,10 +51,10 @@ export class SensorPanel {
 
   /** Say in the top bar which radars do not tell all, and what a restart has reset. @param {SensorState[]} sensors */
   warn(sensors) {
-    const poor = sensors.filter((one) => (one.kind === 'radar' || RESET[one.id]) && (one.status === 'degraded' || one.status === 'silent'));
+    const poor = sensors.filter((one) => (one.kind === 'radar' || resetOf(one)) && (one.status === 'degraded' || one.status === 'silent'));
     const chip = byId('degraded');
     chip.hidden = poor.length === 0;
-    setText(chip, poor.map((one) => `${MARKS[/** @type {keyof typeof MARKS} */ (one.status)]} ${RESET[one.id] ?? `${one.id} ${one.status}`}`).join('  '));
+    setText(chip, poor.map((one) => `${MARKS[/** @type {keyof typeof MARKS} */ (one.status)]} ${resetOf(one) || `${one.id} ${one.status}`}`).join('  '));
     chip.title = poor.map((one) => `${one.kind === 'radar' ? `radar ${one.id}: ` : ''}${one.detail || one.status}`).join('\n');
   }
 

@@ -4,7 +4,7 @@ import { test, mock } from 'node:test';
 import { LiveFeed } from '../../../static/js/feed/live.js';
 import { onKey } from '../../../static/js/input/keys.js';
 import { matches } from '../../../static/js/panels/list.js';
-import { drops } from '../../../static/js/panels/sensors.js';
+import { drops, resetOf } from '../../../static/js/panels/sensors.js';
 import { bannerText, healthOf } from '../../../static/js/panels/status.js';
 import { DEFAULTS, Settings, next, sane, viewFromQuery, viewToQuery, VECTORS } from '../../../static/js/settings.js';
 
@@ -188,4 +188,11 @@ test('a connection that ends before it is open may have been refused, and the ba
   made.stop();
   assert.match(bannerText('lost', NaN, 'waiting', 'the page comes from elsewhere'), /^NO FEED .*refused: the page comes from elsewhere/);
   assert.match(bannerText('lost', NaN, 'waiting'), /reconnecting/);
+});
+
+test('what a restart took away is told in the top bar, and only that', () => {
+  assert.equal(resetOf({ id: 'runways', kind: 'store' }), 'RUNWAY STATE – CHECK');
+  assert.equal(resetOf({ id: 'restart', kind: 'store' }), 'ALERTS RESET BY RESTART');
+  assert.equal(resetOf({ id: 'database', kind: 'store' }), '');
+  assert.equal(resetOf({ id: 'runways', kind: 'radar' }), '');
 });
