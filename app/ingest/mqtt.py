@@ -212,7 +212,7 @@ class MqttThread:
             digest = hashlib.blake2b(topic.encode() + b"\0" + message.payload, digest_size=16).digest()
             if message.dup and digest in self._recent:  # taken before, but its acknowledgement was lost
                 self._counted["messages_repeated"] += 1
-            elif not self._taken(topic, message.payload):
+            elif not self._taken(topic, bytes(message.payload)):
                 return
             self._remember(digest)
         client.ack(message.mid, message.qos)
