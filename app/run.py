@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import socket
 import time
 from collections.abc import Callable
@@ -30,6 +31,8 @@ from pipeline.airport.model import Airport
 
 if TYPE_CHECKING:
     from app.view3d import View3D
+
+log = logging.getLogger(__name__)
 
 STEP_END_S = 0.3
 """How long the step of the start-up that runs when the service is told to end is waited for: the compiler takes

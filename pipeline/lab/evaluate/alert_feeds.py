@@ -91,7 +91,7 @@ def radar_inputs(
         first, last = grid.azimuths * block // BLOCKS, grid.azimuths * (block + 1) // BLOCKS
         rows = np.arange(first, last, dtype=np.int32)
         at = world.start + (scan + (rows + 0.5) / grid.azimuths) * grid.period_s
-        azimuth = (rows + 0.5) * grid.azimuth_step_rad
+        azimuth = np.asarray((rows + 0.5) * grid.azimuth_step_rad, np.float64)
         amplitude = video.sweeps(scan, first, last, world.truth)
         sector = chain.process(Sweeps(0, scan, rows, azimuth, at, amplitude, block == BLOCKS - 1))
         since, time = time, world.start + (scan + (block + 1) / BLOCKS) * grid.period_s
