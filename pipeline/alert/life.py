@@ -128,6 +128,7 @@ def write_alert(case: Case, situation: Situation, rows: dict[int, int], stage: S
         text=conflict.text + (" (surveillance degraded)" if situation.degraded else ""),
         updated_at=situation.time,
         targets=tuple(targets),
+        runway=conflict.runway,
         holding_point=conflict.holding_point or former.holding_point,
         time_to_threshold=conflict.time_to_threshold,
         distance_to_threshold=conflict.distance_to_threshold,

@@ -6,7 +6,7 @@ then what is nearest in time. It gives rule, text and figures; the other targets
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from pipeline.alert.conflict import label_of
@@ -17,7 +17,7 @@ from pipeline.contracts.alert import Conflict, Situation
 def merge(situation: Situation, found: Sequence[Conflict]) -> list[Conflict]:
     """One conflict an intruder and runway, from those that the rules report in their order.
 
-    A conflict without an intruder joins one of the same targets on the same runway.
+    Conflicts of the same targets are one: also without an intruder, and on two runways whose crossing they approach.
     """
     order = {rule: i for i, rule in enumerate(dict.fromkeys(one.rule for one in found))}
     groups: list[list[Conflict]] = []
@@ -38,22 +38,29 @@ def find_case(
     taken: cases that have met their conflict in this look.
     """
     track, address = intruder_of(conflict, addresses)
-    free = [one for one in cases if one.conflict.runway == conflict.runway and not any(one is t for t in taken)]
-    ways = (
-        lambda case: track is not None and case.intruder[0] == track,
-        lambda case: frozenset(case.conflict.tracks) == frozenset(conflict.tracks),
-        lambda case: bool(address) and case.intruder[1] == address,
-        lambda case: case.renamed(conflict, addresses),
+    free = [one for one in cases if not any(one is t for t in taken)]
+    here = [one for one in free if one.conflict.runway == conflict.runway]
+    ways: tuple[tuple[list[Case], Callable[[Case], bool]], ...] = (
+        (here, lambda case: track is not None and case.intruder[0] == track),
+        (here, lambda case: frozenset(case.conflict.tracks) == frozenset(conflict.tracks)),
+        (free, lambda case: _same_targets(case.conflict, conflict)),
+        (here, lambda case: bool(address) and case.intruder[1] == address),
+        (here, lambda case: case.renamed(conflict, addresses)),
     )
-    return next((case for way in ways for case in free if way(case)), None)
+    return next((case for among, way in ways for case in among if way(case)), None)
 
 
 def _same(one: Conflict, other: Conflict) -> bool:
     if one.runway != other.runway:
-        return False
+        return _same_targets(one, other)
     if one.intruder is not None and one.intruder == other.intruder:
         return True
     return frozenset(one.tracks) == frozenset(other.tracks)
+
+
+def _same_targets(one: Conflict, other: Conflict) -> bool:
+    """Whether both are between the same targets, two at least."""
+    return len(frozenset(one.tracks)) > 1 and frozenset(one.tracks) == frozenset(other.tracks)
 
 
 def _rank(one: Conflict, order: dict[str, int]) -> tuple[bool, bool, int, float]:

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from pipeline.airport.model import Airport
 from pipeline.alert.monitor import AlertMonitor
 from pipeline.contracts.alert import Conflict, Situation
 from pipeline.picture import AlertChange
@@ -21,6 +22,7 @@ from tests.pipeline.alert.scene import (
     small_airport,
     tracks_at,
 )
+from tests.support.small_airport import small_airport as crossing_runways
 
 THREE = tracks_at(
     [
@@ -76,9 +78,9 @@ def test_an_arrival_that_has_landed_is_called_landed_in_every_text() -> None:
 class Script:
     """A monitor whose one rule says what the test says."""
 
-    def __init__(self) -> None:
+    def __init__(self, airport: Airport | None = None) -> None:
         self.conflicts: tuple[Conflict, ...] = ()
-        self.monitor = AlertMonitor(small_airport(), [self])
+        self.monitor = AlertMonitor(airport or small_airport(), [self])
         self.time = 1000.0
 
     def __call__(self, situation: Situation) -> tuple[Conflict, ...]:
@@ -90,8 +92,15 @@ class Script:
         return list(self.monitor.update(tracks, self.time))
 
 
-def says(rule: str, tracks: tuple[int, ...], intruder: int | None, stage: Any = "information", **rest: Any) -> Conflict:
-    return Conflict(rule, "09/27", tracks, stage, f"{rule} {stage}", intruder, certain=True, **rest)
+def says(
+    rule: str,
+    tracks: tuple[int, ...],
+    intruder: int | None,
+    stage: Any = "information",
+    runway: str = "09/27",
+    **rest: Any,
+) -> Conflict:
+    return Conflict(rule, runway, tracks, stage, f"{rule} {stage}", intruder, certain=True, **rest)
 
 
 def test_the_gravest_leads_and_the_others_are_named_after_it() -> None:
@@ -132,6 +141,25 @@ def test_a_pair_without_an_intruder_is_the_pair_of_another_rule() -> None:
     assert {one.operation for one in script.step(says("opposite_direction", (2, 1), None))} == {"update"}
     assert {one.operation for one in script.step(says("runway_occupied", (1, 2), 2))} == {"update"}
     assert len(script.monitor.alerts) == 1
+
+
+def test_a_pair_that_meets_where_two_runways_cross_is_one_alert_whichever_runway_leads() -> None:
+    script = Script(crossing_runways())
+    here, there = (
+        says("runway_occupied", (1, 2), 2, runway="06/24"),
+        says("runway_occupied", (2, 1), 1, "alarm", runway="02/20"),
+    )
+    changes = script.step(here, there)
+    assert [(one.operation, one.alert.id, one.alert.runway) for one in changes] == [("raise", 1, "02/20")]
+    (change,) = script.step(says("runway_occupied", (1, 2), 2, "alarm", runway="06/24"))
+    assert (change.operation, change.alert.id, change.alert.runway) == ("update", 1, "06/24")
+    assert len(script.monitor.alerts) == 1
+
+
+def test_a_lone_target_on_two_runways_is_two_alerts() -> None:
+    script = Script(crossing_runways())
+    script.step(says("hold_entry", (3,), 3, runway="06/24"), says("hold_entry", (3,), 3, runway="02/20"))
+    assert {one.runway for one in script.monitor.alerts} == {"02/20", "06/24"}
 
 
 def test_two_conflicts_of_one_look_never_share_an_alert() -> None:
