@@ -89,7 +89,7 @@ class Track(Model):
     course_deg: float | None = Field(description="direction of movement; null below 0.5 m/s")
     heading_deg: float | None = Field(description="where the nose points")
     axis_deg: float | None = Field(
-        description="bearing of the long axis as radars see it, 0 to 180; known of targets that never moved as well"
+        description="bearing of the long axis as radars see it, 0 to 180; null unless clearly longer than wide"
     )
     length_m: float | None
     width_m: float | None

@@ -24,9 +24,6 @@ RING_M = 70.0
 VECTOR_S = 10.0
 """A speed vector ends where the target would be after this time."""
 
-LONG = 1.3
-"""Times as long as wide that a track without a heading is at least, to be drawn along its axis; as in the display."""
-
 SLOW_MPS = 1.5
 """Below this a vector is not drawn and the course is not taken for a heading."""
 
@@ -129,7 +126,8 @@ class Movers:
         heading = self._headings(tracks, place, speed)
         shape = np.where(np.isnan(heading) & (category == TargetClass.AIRCRAFT), ROUND, category)
         coasting = tracks.phase == TrackPhase.COASTING
-        wxyz = _turned(np.nan_to_num(np.where(np.isfinite(heading), heading, _axes(tracks))))
+        axis = np.deg2rad(np.round(np.rad2deg(tracks.axis)))
+        wxyz = _turned(np.nan_to_num(np.where(np.isfinite(heading), heading, axis)))
         bodies = {}
         for k, name in enumerate(SHAPES):
             one = shape == k
@@ -215,12 +213,6 @@ def _sizes(tracks: Tracks, category: NDArray[np.int64]) -> NDArray[np.float64]:
     # A radar sees the extent of an airliner badly across its nose; outside these proportions it would look broken.
     size[plane, 1] = np.clip(size[plane, 1], 0.75 * size[plane, 0], 1.1 * size[plane, 0])
     return np.round(size * 2) / 2
-
-
-def _axes(tracks: Tracks) -> NDArray[np.float64]:
-    """(n,) bearing along which a track is clearly longer than wide, so that its axis is no noise; nan elsewhere."""
-    long = tracks.length >= LONG * tracks.width
-    return np.where(long, np.deg2rad(np.round(np.rad2deg(tracks.axis))), np.nan)
 
 
 def _tallness(kind: int, size: NDArray[np.float64]) -> NDArray[np.float64]:

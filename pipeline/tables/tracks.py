@@ -52,7 +52,10 @@ class Tracks(Table):
     width: Array = column("f4", "m", "smoothed extent across the heading; nan when unknown", default=float("nan"))
     heading: Array = column("f4", "rad", "where the nose points; nan when unknown", default=float("nan"))
     axis: Array = column(
-        "f4", "rad", "direction of the long axis as radars see it, in [0, pi); nan when unknown", default=float("nan")
+        "f4",
+        "rad",
+        "bearing of the long axis, in [0, pi), as radars see it; nan unless clearly longer than wide",
+        default=float("nan"),
     )
     altitude: Array = column("f4", "m", "height above the airport; nan when unknown", default=float("nan"))
     on_ground: Array = column("?", "", "held to be on the ground", default=True)

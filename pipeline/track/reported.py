@@ -29,6 +29,9 @@ COURSE_SPEED = 2.0
 OVERHEAD = 45.0
 """m above the airport beyond which a target flies over what is below it, as in the rules of the alerts."""
 
+LONG = 1.3
+"""Times as long as wide that a target is at least for its axis to be told: that of a round echo is noise."""
+
 NOWHERE = -1
 """Index of no zone and no runway."""
 
@@ -153,7 +156,8 @@ def _describe(
         misses[k] = max(fewest, 0)
         v_east, v_north = state[k, 2], state[k, 3]
         if one["extent_count"] > 0:
-            length[k], width[k], heading[k], axis[k] = one["length"], one["width"], one["heading"], one["axis_bearing"]
+            length[k], width[k], heading[k] = one["length"], one["width"], one["heading"]
+            axis[k] = one["axis_bearing"] if length[k] >= LONG * width[k] else np.nan
         else:
             length[k] = width[k] = heading[k] = axis[k] = np.nan
             if v_east * v_east + v_north * v_north > COURSE_SPEED * COURSE_SPEED:

@@ -14,8 +14,6 @@ export const STANDING_MPS = 0.5;
 /** A history dot this often, s. */
 export const HISTORY_STEP_S = 2;
 const HISTORY_MAX = 31;
-/** How many times as long as wide a target is at least, for its axis to be told from noise. */
-const LONG = 1.3;
 const RAD = Math.PI / 180;
 
 /** @param {unknown} value @returns {value is number} */
@@ -42,11 +40,8 @@ export function pointing(track) {
   return null;
 }
 
-/** @param {Track} track @returns {number|null} rad, along which it is clearly longer than wide; its nose may be at either end */
-export function axisOf(track) {
-  if (!finite(track.axis_deg) || !finite(track.length_m) || !finite(track.width_m)) return null;
-  return track.length_m >= LONG * track.width_m ? track.axis_deg * RAD : null;
-}
+/** @param {Track} track @returns {number|null} rad, along which it is longer than wide; its nose may be at either end */
+export const axisOf = (track) => (finite(track.axis_deg) ? track.axis_deg * RAD : null);
 
 /**
  * A target new to the screen.

@@ -128,6 +128,12 @@ def test_extent_and_heading_are_those_of_the_track_and_without_an_extent_the_cou
     assert np.isnan(tracks.heading[3])  # 1.94 m/s
 
 
+@pytest.mark.parametrize(("width", "known"), [(30.0, True), (30.1, False), (np.nan, False)])
+def test_the_axis_is_told_of_what_is_clearly_longer_than_wide(width: float, known: bool) -> None:
+    core = core_of({"length": 39.0, "width": width, "axis_bearing": 0.25, "extent_count": 1})
+    assert np.isfinite(reported_tracks(core).axis[0]) == known
+
+
 @pytest.mark.parametrize(("radars", "memory"), [((RADAR,), 5.0), ((RADAR, SLOW), 8.0)])
 def test_a_sensor_is_shown_for_five_seconds_or_two_turns(radars: tuple[RadarSite, ...], memory: float) -> None:
     now, old = T0 + 3.0 - memory + 0.1, T0 + 3.0 - memory - 0.1

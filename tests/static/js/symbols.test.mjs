@@ -3,7 +3,6 @@ import { test } from 'node:test';
 
 import { drawSymbol } from '../../../static/js/draw/symbols.js';
 import { drawTargets } from '../../../static/js/draw/targets.js';
-import { axisOf } from '../../../static/js/model/motion.js';
 
 /** A pen that remembers where it went, and what it did. */
 function pen() {
@@ -59,14 +58,6 @@ test('without a heading what is known to be long lies along its axis, with the s
   const made = pen();
   drawSymbol(made, 0, 0, 0.05, 0, { ...look, ...rest });
   for (const [x, y] of made.points) assert.ok(made.points.some(([a, b]) => Math.hypot(a + x, b - y) < 1e-9));
-});
-
-test('the axis of a target counts only where it is clearly longer than wide', () => {
-  const track = { axis_deg: 90, length_m: 40, width_m: 30 };
-  assert.equal(axisOf(track), Math.PI / 2);
-  assert.equal(axisOf({ ...track, width_m: 36 }), null);
-  assert.equal(axisOf({ ...track, axis_deg: null }), null);
-  assert.equal(axisOf({ axis_deg: 90 }), null);
 });
 
 test('zoomed out, symbols keep a size at which they can be told apart', () => {
