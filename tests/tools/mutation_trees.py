@@ -28,6 +28,9 @@ COPIED = ("app", "pipeline", "static", "migrations", "tests", "pyproject.toml", 
 MOST_MEMORY = 8 * 2**30
 """Octets of address space for the tests of a mutant; a loop that allocates must not take the machine with it."""
 
+WITHOUT_BROWSER = "not browser"
+"""A browser takes more address space than MOST_MEMORY."""
+
 QUICK_S = 1.0
 """A test that takes more processor time without the compiler, s, is left to the round with it."""
 
@@ -248,6 +251,7 @@ class Tree:
         results.write_text("")
         code, output = self._python(
             ["-m", "pytest", "-q", "-rfE", "--tb=no", "--no-header", "-p", "no:cacheprovider", "--hypothesis-seed=0",
+             "-m", WITHOUT_BROWSER,
              "-p", "tests.tools.mutation_watch", f"--mutation-plan={plan}", f"--mutation-results={results}",
              *self._deselected, *files],
             {"NUMBA_DISABLE_JIT": "1", "NUMBA_CACHE_DIR": str(self._spare / "none")}
