@@ -14,7 +14,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from app.api.bodies import CLOSE, Bodies, Body
 from app.api.problems import problem
 from app.api.subpath import below, path_below, root_of
-from app.live.session import origin_allowed
+from app.live.session import LOOPBACK, origin_allowed
 from app.settings import Settings
 
 STRICT = (
@@ -41,7 +41,6 @@ PREFLIGHT = {
     "Access-Control-Allow-Headers": "*",
     "Access-Control-Max-Age": "86400",
 }
-LOOPBACK = ("localhost", "127.0.0.1", "::1")
 CONTROL = re.compile(rb"[\x00-\x1f\x7f]")
 """Control characters: no name in an address has one, and a log, a database or a file system may stumble over it."""
 

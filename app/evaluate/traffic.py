@@ -19,7 +19,7 @@ from pipeline.airport.model import Airport
 from pipeline.lab.evaluate import RecordedTraffic
 from pipeline.lab.simulate.recording import Recording, RecordingError
 from pipeline.lab.simulate.traffic import FEET, CleaningRules, Trajectory, clean
-from pipeline.tables import TargetReports
+from pipeline.tables import TargetCategory, TargetReports
 
 SHIPPED = "LFPO"
 """The airport whose traffic record is shipped."""
@@ -131,7 +131,8 @@ def _reports(rows: Sequence[dict[str, Any]], airport: Airport, ground_ft: float)
     return TargetReports.build(
         len(rows), time=milliseconds / 1e3, address=[str(one.get("icao24") or "").lower()[:6] for one in rows],
         callsign=[str(one.get("callsign") or "").strip()[:8] for one in rows], east=east, north=north,
-        altitude=altitude, speed=knots * KNOTS, course=np.radians(track), on_ground=ground, category=1,
+        altitude=altitude, speed=knots * KNOTS, course=np.radians(track), on_ground=ground,
+        category=TargetCategory.AIRCRAFT,
     )[kept]  # fmt: skip
 
 

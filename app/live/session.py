@@ -28,6 +28,10 @@ CLOSE_S = 5.0
 """How long a closing connection may take to swallow what was written before it is cut."""
 
 
+LOOPBACK = ("localhost", "127.0.0.1", "::1")
+"""Names of this machine for itself, under which it may always be asked."""
+
+
 def origin_allowed(origin: str | None, host: str | None, allowed: Iterable[str]) -> bool:
     """Programs send no Origin; a page must come from the host it talks to or from a listed origin."""
     if origin is None:

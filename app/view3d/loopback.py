@@ -18,9 +18,7 @@ import websockets.datastructures
 import websockets.exceptions
 from websockets.http11 import Request, Response
 
-from app.live.session import origin_allowed
-
-LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
+from app.live.session import LOOPBACK, origin_allowed
 
 
 def refusal(request: Request) -> Response | None:

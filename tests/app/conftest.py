@@ -8,15 +8,14 @@ from pathlib import Path
 import httpx
 import pytest
 
-from tests.support.running import Server, running, until
+from tests.support.running import Server, first_picture, running
 
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """A server with a store and one picture; shared by the tests of a module that only look."""
     with running(Path(tmp_path_factory.mktemp("store"))) as made:
-        made.service.step()
-        until(lambda: made.hub.picture is not None, "the first picture is numbered")
+        first_picture(made)
         yield made
 
 

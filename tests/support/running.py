@@ -52,6 +52,12 @@ class Server:
         return f"ws://127.0.0.1:{self.port}/api/v1/live"
 
 
+def first_picture(server: Server) -> None:
+    """Let the service make a picture, and wait until the feed has it."""
+    server.service.step()
+    until(lambda: server.hub.picture is not None, "the first picture is numbered")
+
+
 @contextlib.contextmanager
 def running(
     folder: Path | None = None,

@@ -11,7 +11,7 @@ import pytest
 from app.airports import load_airport
 from pipeline.tables import Tracks
 from tests.support.fake_traffic import synthetic_tracks
-from tests.support.running import running, until
+from tests.support.running import first_picture, running
 from tests.support.small_airport import as_geojson
 
 HEIGHT = 500.0
@@ -29,8 +29,7 @@ def test_an_aircraft_above_the_airport(
     monkeypatch.setattr("tests.support.fake_service.synthetic_tracks", airborne)
     monkeypatch.setattr("tests.support.fake_service.as_geojson", lambda airport: as_geojson(airport) | more)
     with running(tmp_path) as server:
-        server.service.step()
-        until(lambda: server.hub.picture is not None, "the first picture is numbered")
+        first_picture(server)
         told = httpx.get(f"{server.url}/data/aircraft.json", timeout=20.0).json()["aircraft"]
     assert {one.get("alt_baro") for one in told} == {altitude}
 

@@ -12,7 +12,7 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.support.running import Server, running, until
+from tests.support.running import Server, first_picture, running, until
 
 CALLS = 60
 """More than the server has threads for."""
@@ -24,8 +24,7 @@ LIMITS = httpx.Limits(max_connections=CALLS + 10, max_keepalive_connections=0)
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[Server]:
     with running(tmp_path) as made:
-        made.service.step()
-        until(lambda: made.hub.picture is not None, "the first picture is numbered")
+        first_picture(made)
         yield made
 
 

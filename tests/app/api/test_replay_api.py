@@ -16,7 +16,7 @@ from schemathesis import GenerationMode
 from tests.app.api.test_openapi import CHECKS
 from tests.support.fake_replay import BEGIN, LENGTH_S, FakeReplay
 from tests.support.live_client import live
-from tests.support.running import Server, running, until
+from tests.support.running import Server, first_picture, running, until
 
 PATH = "/api/v1/replay"
 JSON = {"content-type": "application/json"}
@@ -31,8 +31,7 @@ def stands() -> list[float]:
 @pytest.fixture(scope="module")
 def replaying(stands: list[float]) -> Iterator[Server]:
     with running(replay=FakeReplay(clock=lambda: stands[0])) as made:
-        made.service.step()
-        until(lambda: made.hub.picture is not None, "the first picture is numbered")
+        first_picture(made)
         yield made
 
 

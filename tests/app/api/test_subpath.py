@@ -26,7 +26,7 @@ from app.settings import Settings
 from app.view3d import View3D, router
 from app.view3d.proxy import subprotocol
 from tests.support.fake_service import FakeService
-from tests.support.running import Server, running, until
+from tests.support.running import Server, first_picture, running, until
 
 ROOT = "/airside"
 
@@ -144,8 +144,7 @@ def served(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     with running(root_path=way.pop("root_path"), view3d=view3d) as server:
         views[0].start()
         assert views[0].ready.wait(30)
-        server.service.step()
-        until(lambda: server.hub.picture is not None, "the first picture is numbered")
+        first_picture(server)
         with nginx(tmp_path_factory.mktemp("nginx"), server.port, **way) as url:
             yield server, url
         views[0].stop()

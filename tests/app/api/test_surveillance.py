@@ -10,14 +10,13 @@ import httpx
 import pytest
 from sqlalchemy.exc import OperationalError
 
-from tests.support.running import Server, running, until
+from tests.support.running import Server, first_picture, running, until
 
 
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[Server]:
     with running(tmp_path) as made:
-        made.service.step()
-        until(lambda: made.hub.picture is not None, "the first picture is numbered")
+        first_picture(made)
         yield made
 
 

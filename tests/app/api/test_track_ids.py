@@ -15,7 +15,7 @@ from pipeline.picture import Picture
 from pipeline.tables import Tracks
 from tests.support.fake_traffic import synthetic_tracks
 from tests.support.live_client import live
-from tests.support.running import Server, running, until
+from tests.support.running import Server, first_picture, running, until
 from tests.support.small_airport import small_airport
 
 FIRST_ID = 2**31 + 7
@@ -36,8 +36,7 @@ def far_tracks(*given: Any) -> Tracks:
 def server(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
     monkeypatch.setattr("tests.support.fake_service.synthetic_tracks", far_tracks)
     with running(tmp_path) as made:
-        made.service.step()
-        until(lambda: made.hub.picture is not None, "the first picture is numbered")
+        first_picture(made)
         yield made
 
 

@@ -19,7 +19,7 @@ from app.live.messages import BadMessage, Subscribe, decode, granted_rate
 from app.live.session import origin_allowed
 from app.settings import FeedSettings
 from tests.support.live_client import LiveClient, live
-from tests.support.running import Server, running, until
+from tests.support.running import Server, first_picture, running, until
 
 HEARTBEAT_S = 0.2
 
@@ -28,8 +28,7 @@ HEARTBEAT_S = 0.2
 def server() -> Iterator[Server]:
     feed = FeedSettings(heartbeat_s=HEARTBEAT_S, lag_limit_s=1.0, max_clients=8, max_message_bytes=2048)
     with running(feed=feed) as made:
-        made.service.step()
-        until(lambda: made.hub.picture is not None, "the first picture is numbered")
+        first_picture(made)
         yield made
 
 
@@ -393,8 +392,7 @@ async def test_a_refused_change_leaves_the_subscription_as_it_was(
 
 async def test_equal_filters_share_a_view_and_the_number_of_views_is_bounded() -> None:
     with running(feed=FeedSettings(max_filters=1)) as server:
-        server.service.step()
-        until(lambda: server.hub.picture is not None, "the first picture is numbered")
+        first_picture(server)
         async with live(server.live) as first, live(server.live) as second, live(server.live) as third:
             assert (await first.subscribe(filter={"classes": ["vehicle", "aircraft"]}))["ok"]
             assert (await second.subscribe(filter={"classes": ["aircraft", "vehicle"]}))["ok"]

@@ -14,14 +14,13 @@ from app.live.hub import Hub
 from app.live.messages import Subscribe
 from tests.support.fake_service import FakeService
 from tests.support.live_client import live
-from tests.support.running import Server, running, until
+from tests.support.running import Server, first_picture, running, until
 
 
 @pytest.fixture
 def server() -> Iterator[Server]:
     with running() as made:
-        made.service.step()
-        until(lambda: made.hub.picture is not None, "the first picture is numbered")
+        first_picture(made)
         yield made
 
 

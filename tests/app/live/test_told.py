@@ -11,7 +11,7 @@ import pytest
 
 from app.settings import FeedSettings
 from tests.support.live_client import LiveClient, live
-from tests.support.running import Server, running, until
+from tests.support.running import Server, first_picture, running, until
 
 HEARTBEATS = 40
 """A client that has got so many signs of life while nothing else came will get nothing else."""
@@ -20,8 +20,7 @@ HEARTBEATS = 40
 @pytest.fixture
 def server() -> Iterator[Server]:
     with running(feed=FeedSettings(heartbeat_s=0.25)) as made:
-        made.service.step()
-        until(lambda: made.hub.picture is not None, "the first picture is numbered")
+        first_picture(made)
         yield made
 
 
@@ -29,8 +28,7 @@ def server() -> Iterator[Server]:
 def calm() -> Iterator[Server]:
     """Without a sign of life for a minute: nothing wakes a client but what it is told."""
     with running(feed=FeedSettings(heartbeat_s=60.0)) as made:
-        made.service.step()
-        until(lambda: made.hub.picture is not None, "the first picture is numbered")
+        first_picture(made)
         yield made
 
 
